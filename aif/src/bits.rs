@@ -1,0 +1,69 @@
+//! A flat set of indices.
+
+/// One bit per index.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Bits {
+    words: Vec<u64>,
+    ones: usize,
+}
+
+impl Bits {
+    /// `n` zero bits.
+    pub fn new(n: usize) -> Self {
+        Bits { words: vec![0; n.div_ceil(64)], ones: 0 }
+    }
+
+    /// Bit `i`; false beyond the end.
+    #[inline]
+    pub fn get(&self, i: usize) -> bool {
+        self.words.get(i >> 6).is_some_and(|w| w >> (i & 63) & 1 == 1)
+    }
+
+    /// Sets bit `i`, growing if need be.
+    #[inline]
+    pub fn set(&mut self, i: usize) {
+        if self.words.len() <= i >> 6 {
+            self.words.resize((i >> 6) + 1, 0);
+        }
+        let (w, b) = (&mut self.words[i >> 6], 1u64 << (i & 63));
+        self.ones += (*w & b == 0) as usize;
+        *w |= b;
+    }
+
+    /// Clears bit `i`.
+    #[inline]
+    pub fn clear(&mut self, i: usize) {
+        if let Some(w) = self.words.get_mut(i >> 6) {
+            let b = 1u64 << (i & 63);
+            self.ones -= (*w & b != 0) as usize;
+            *w &= !b;
+        }
+    }
+
+    /// Number of set bits. O(1).
+    pub fn count(&self) -> usize {
+        self.ones
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        8 * self.words.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Bits;
+
+    #[test]
+    fn setting_twice_counts_once() {
+        let mut b = Bits::new(10);
+        b.set(3);
+        b.set(3);
+        b.set(200);
+        assert_eq!((b.count(), b.get(3), b.get(4), b.get(200), b.get(10_000)), (2, true, false, true, false));
+        b.clear(3);
+        b.clear(3);
+        assert_eq!((b.count(), b.get(3)), (1, false));
+    }
+}

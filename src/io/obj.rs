@@ -1,0 +1,5 @@
+//! (being written)
+use super::{Decoded, DecodeError, Encoded, EncodeError, EncodeOptions};
+use crate::scene::Scene;
+pub fn decode(_: &[u8], _: &dyn super::Side) -> Result<Decoded, DecodeError> { Err(DecodeError::Unsupported { what: "obj".into() }) }
+pub fn encode(_: &Scene, _: &EncodeOptions) -> Result<Encoded, EncodeError> { Ok(Encoded::default()) }

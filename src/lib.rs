@@ -1,0 +1,9 @@
+//! progmesh: progressive and multiresolution meshes.
+
+pub use progmesh_aif as aif;
+pub use progmesh_meshes as meshes;
+pub use progmesh_refine as refine;
+pub use progmesh_simplify as simplify;
+
+pub mod io;
+pub mod scene;
