@@ -19,6 +19,7 @@
 pub mod attributes;
 mod bits;
 mod build;
+mod edit;
 mod error;
 mod ids;
 mod mesh;
@@ -29,6 +30,7 @@ mod weld;
 pub use attributes::{Channel, Encoding, Semantic, TooManyChannels, Wedges};
 pub use bits::Bits;
 pub use build::{BuildOptions, BuildReport, MeshInput};
+pub use edit::{Collapse, CollapseRecord, LinkViolation, Marks, Wing};
 pub use error::BuildError;
 pub use ids::{EdgeId, FaceId, NONE, VertexId, WedgeId};
 pub use mesh::Mesh;
