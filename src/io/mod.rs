@@ -9,6 +9,8 @@ pub mod obj;
 pub mod off;
 pub mod ply;
 pub mod stl;
+#[allow(dead_code)] // for now: its users are being written
+pub(crate) mod text;
 
 use crate::scene::Scene;
 
