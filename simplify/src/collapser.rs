@@ -1,0 +1,244 @@
+//! Quadric edge collapse on one mesh (Garland & Heckbert 1997): quadrics, the cost and place of a candidate, and the collapse
+//! itself. The order is a schedule's business ([`crate::exact`], [`crate::bulk`]).
+
+use crate::options::{Options, Placement, Refused};
+use crate::quadric::Quadric;
+use crate::validity::{MAX_VALENCE, faces_stay_good};
+use crate::wedges::WedgeMerge;
+use crate::work::{Kind, Roles, Work};
+use glam::DVec3;
+use progmesh_aif::{EdgeId, VertexId};
+
+/// Weight of the plane that stands on a border edge, times the edge's squared length.
+const BORDER_WEIGHT: f64 = 10.0;
+/// Weight of the planes that stand on a seam edge.
+const SEAM_WEIGHT: f64 = 1.0;
+/// Pull towards the middle of the edge, relative to the mean eigenvalue of A: decides where A does not.
+const PULL: f64 = 1e-3;
+/// A vertex may be placed at most this many edge lengths from the middle of its edge.
+const REACH: f64 = 2.0;
+
+/// Where an edge would go, and at what cost.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) roles: Roles,
+    pub(crate) to: DVec3,
+    /// Quadric cost in local units: area times squared distance.
+    pub(crate) cost: f64,
+}
+
+/// A mesh with quadrics on its vertices.
+pub(crate) struct Collapser<'m> {
+    pub(crate) work: Work<'m>,
+    quadrics: Vec<Quadric>,
+    placement: Placement,
+    /// Largest cost per weight so far, local units.
+    pub(crate) worst: f64,
+    /// Costs per weight may not pass this, local units.
+    pub(crate) bound: f64,
+    pub(crate) tried: u64,
+    pub(crate) refused: Refused,
+    wedges: WedgeMerge,
+}
+
+impl<'m> Collapser<'m> {
+    /// Fills the quadrics. O(n).
+    pub(crate) fn new(mut work: Work<'m>, options: &Options) -> Self {
+        let placement = match options.keep_vertices {
+            true => Placement::Endpoint,
+            false => options.placement.unwrap_or(Placement::Optimal),
+        };
+        let quadrics = fill_quadrics(&work, options);
+        let bound = options.max_error.map_or(f64::INFINITY, |b| work.local_bound_squared(b));
+        let wedges = WedgeMerge::new(&mut work);
+        Collapser {
+            work,
+            quadrics,
+            placement,
+            worst: 0.0,
+            bound,
+            tried: 0,
+            refused: Refused::default(),
+            wedges,
+        }
+    }
+
+    /// Cost and place of `e`; `None` when the kinds of its vertices forbid it. Reads nothing but the two vertices. O(1).
+    #[inline]
+    pub(crate) fn evaluate(&self, e: EdgeId) -> Option<Candidate> {
+        let roles = self.work.roles(e)?;
+        let (k, r) = (roles.kept.index(), roles.removed.index());
+        let (pk, pr) = (self.work.points[k], self.work.points[r]);
+        let span = pr - pk;
+        // About the kept vertex.
+        let q = self.quadrics[k].plus(&self.quadrics[r].moved(-span));
+        if roles.fixed {
+            return Some(Candidate { roles, to: pk, cost: q.at(DVec3::ZERO) });
+        }
+        match self.placement {
+            Placement::Optimal => {
+                let middle = span * 0.5;
+                let reach = REACH * REACH * span.length_squared();
+                let best = q
+                    .minimise(middle, PULL * q.trace() / 3.0)
+                    .filter(|t| t.distance_squared(middle) <= reach)
+                    .unwrap_or_else(|| least(&q, [DVec3::ZERO, middle, span]));
+                Some(Candidate { roles, to: pk + best, cost: q.at(best) })
+            }
+            Placement::Midpoint => {
+                Some(Candidate { roles, to: (pk + pr) * 0.5, cost: q.at(span * 0.5) })
+            }
+            Placement::Endpoint => {
+                let (here, there) = (q.at(DVec3::ZERO), q.at(span));
+                // Only a vertex of the same kind can take the other's place.
+                let same_kind = self.work.kinds[k] == self.work.kinds[r];
+                if same_kind && there < here {
+                    let swapped = Roles { kept: roles.removed, removed: roles.kept, fixed: false };
+                    return Some(Candidate { roles: swapped, to: pr, cost: there });
+                }
+                Some(Candidate { roles, to: pk, cost: here })
+            }
+        }
+    }
+
+    /// Collapses the candidate if topology and geometry allow it. O(valence).
+    pub(crate) fn attempt(&mut self, e: EdgeId, c: &Candidate) -> bool {
+        self.tried += 1;
+        let Roles { kept, removed, .. } = c.roles;
+        let work = &mut self.work;
+        let t = work.mesh.topology();
+        if t.star(kept).len() + t.star(removed).len() > MAX_VALENCE + 4
+            && t.star(kept).len() + t.star(removed).len() > 4 + t.star(kept).len().max(t.star(removed).len())
+        {
+            self.refused.valence += 1;
+            return false;
+        }
+        if work.pinches_seam(e) {
+            self.refused.border += 1;
+            return false;
+        }
+        if t.link_condition_of_regular(e, kept, &mut work.marks).is_err() {
+            self.refused.link += 1;
+            return false;
+        }
+        let gone = t.edge_faces(e);
+        let kept_stays = c.to == work.points[kept.index()];
+        if !faces_stay_good(t, &work.points, removed, c.to, gone)
+            || !(kept_stays || faces_stay_good(t, &work.points, kept, c.to, gone))
+        {
+            self.refused.flip += 1;
+            return false;
+        }
+        self.collapse(e, c);
+        true
+    }
+
+    fn collapse(&mut self, e: EdgeId, c: &Candidate) {
+        let Roles { kept, removed, .. } = c.roles;
+        let (k, r) = (kept.index(), removed.index());
+        let (pk, pr) = (self.work.points[k], self.work.points[r]);
+        let q = self.quadrics[k].plus(&self.quadrics[r].moved(pk - pr));
+        if q.weight > 0.0 {
+            self.worst = self.worst.max(c.cost / q.weight);
+        }
+        self.wedges.merge(&mut self.work, e, &c.roles, c.to);
+        self.quadrics[k] = q.moved(c.to - pk);
+        self.work.perform(e, &c.roles, c.to);
+    }
+
+    /// Estimated error so far, model units: the root of the largest cost per weight.
+    pub(crate) fn estimate(&self) -> f64 {
+        self.worst.sqrt() / self.work.scale
+    }
+
+    /// True if a candidate of this cost respects the error bound.
+    #[inline]
+    pub(crate) fn within_bound(&self, c: &Candidate) -> bool {
+        if self.bound == f64::INFINITY {
+            return true;
+        }
+        let weight = self.quadrics[c.roles.kept.index()].weight + self.quadrics[c.roles.removed.index()].weight;
+        c.cost <= self.bound * weight
+    }
+}
+
+/// The best of three places.
+fn least(q: &Quadric, places: [DVec3; 3]) -> DVec3 {
+    let [a, b, c] = places;
+    let (qa, qb, qc) = (q.at(a), q.at(b), q.at(c));
+    if qb <= qa && qb <= qc {
+        b
+    } else if qa <= qc {
+        a
+    } else {
+        c
+    }
+}
+
+/// Every face's plane at its vertices, weighted by area; planes that stand on borders and seams.
+fn fill_quadrics(work: &Work<'_>, options: &Options) -> Vec<Quadric> {
+    let t = work.mesh.topology();
+    let mut quadrics = vec![Quadric::default(); t.vertex_slots()];
+    let mut normals = Vec::new();
+    let constrained = |e: EdgeId| t.edge_faces(e).len() == 1 || work.seams.get(e.index());
+    for f in t.faces() {
+        let [a, b, c] = t.triangle(f);
+        let p = |v: VertexId| work.points[v.index()];
+        let n = (p(b) - p(a)).cross(p(c) - p(a));
+        let double_area = n.length();
+        if double_area > 0.0 {
+            let unit = n / double_area;
+            let area = 0.5 * double_area;
+            for v in [a, b, c] {
+                let q = &mut quadrics[v.index()];
+                q.add_plane(unit, area);
+                q.weight += area;
+            }
+            normals.push(unit);
+        } else {
+            normals.push(DVec3::ZERO);
+        }
+        for &u in t.face_edges(f) {
+            let e = u.edge();
+            if !constrained(e) {
+                continue;
+            }
+            let [x, y] = t.edge_vertices(e);
+            let along = p(y) - p(x);
+            let across = along.cross(n);
+            let length = across.length();
+            if length > 0.0 {
+                let k = if t.edge_faces(e).len() == 1 { BORDER_WEIGHT } else { SEAM_WEIGHT };
+                for v in [x, y] {
+                    quadrics[v.index()].add_plane(across / length, k * along.length_squared());
+                }
+            }
+        }
+    }
+    if !options.vertex_weights.is_empty() {
+        for (q, &w) in quadrics.iter_mut().zip(&options.vertex_weights) {
+            q.a.iter_mut().for_each(|x| *x *= w as f64);
+            q.weight *= w as f64;
+        }
+    }
+    quadrics
+}
+
+impl Work<'_> {
+    /// Collapses `e` in the topology and follows with the seams, the position and the count.
+    pub(crate) fn perform(&mut self, e: EdgeId, roles: &Roles, to: DVec3) {
+        let record = self.mesh.topology_mut().collapse(e, roles.kept);
+        for wing in record.wings() {
+            self.triangles -= 1;
+            if self.seams.get(wing.removed_edge.index()) {
+                self.seams.set(wing.kept_edge.index());
+            }
+        }
+        let k = roles.kept.index();
+        if self.points[k] != to {
+            self.points[k] = to;
+            self.moved.set(k);
+        }
+        debug_assert!(self.kinds[roles.removed.index()] != Kind::Pinned);
+    }
+}

@@ -1,0 +1,126 @@
+//! The exact schedule: always the cheapest edge of all meshes.
+//!
+//! A lazy heap: entries hold a cost and an edge; a popped entry whose edge has become dearer goes back with its new cost.
+//! That is exact for accumulated quadrics without normalisation, because their costs never fall.
+
+use crate::collapser::Collapser;
+use crate::options::{Control, Stop};
+use progmesh_aif::{Bits, EdgeId};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// What to stop at.
+pub(crate) struct Goal {
+    /// Triangles over all meshes.
+    pub(crate) triangles: usize,
+}
+
+/// Edges of several meshes under one numbering.
+pub(crate) struct Numbering {
+    starts: Vec<u32>,
+}
+
+impl Numbering {
+    pub(crate) fn new(meshes: &[Collapser<'_>]) -> Self {
+        let mut sum = 0u32;
+        let starts = meshes
+            .iter()
+            .map(|m| {
+                let start = sum;
+                sum += m.work.mesh.topology().edge_slots() as u32;
+                start
+            })
+            .collect();
+        Numbering { starts }
+    }
+
+    /// Mesh and edge of a number.
+    #[inline]
+    pub(crate) fn find(&self, n: u32) -> (usize, EdgeId) {
+        let mesh = if self.starts.len() == 1 { 0 } else { self.starts.partition_point(|&s| s <= n) - 1 };
+        (mesh, EdgeId(n - self.starts[mesh]))
+    }
+
+    /// Number of an edge.
+    #[inline]
+    pub(crate) fn number(&self, mesh: usize, e: EdgeId) -> u32 {
+        self.starts[mesh] + e.0
+    }
+}
+
+/// Orders by cost, then by edge: no negative costs, so the bits of an f32 sort as it does.
+#[inline]
+fn key(cost: f64, n: u32) -> Reverse<u64> {
+    Reverse((((cost as f32).to_bits() as u64) << 32) | n as u64)
+}
+
+/// Runs until the goal is met. `factors[i]` turns costs of mesh `i` into common ones.
+pub(crate) fn run(
+    meshes: &mut [Collapser<'_>],
+    factors: &[f64],
+    goal: &Goal,
+    control: &dyn Control,
+) -> Stop {
+    let numbering = Numbering::new(meshes);
+    let mut left: usize = meshes.iter().map(|m| m.work.triangles).sum();
+    let first = left;
+    let mut heap_entries = Vec::new();
+    for (i, m) in meshes.iter_mut().enumerate() {
+        let edges: Vec<EdgeId> = m.work.mesh.topology().edges().collect();
+        for e in edges {
+            match m.evaluate(e) {
+                Some(c) => heap_entries.push(key(c.cost * factors[i], numbering.number(i, e))),
+                None => m.refused.locked += 1,
+            }
+        }
+    }
+    let mut heap = BinaryHeap::from(heap_entries);
+    // Edges refused where they stood: they get another chance when their surroundings change.
+    let mut waiting: Vec<Bits> = meshes.iter().map(|m| Bits::new(m.work.mesh.topology().edge_slots())).collect();
+    let mut bounded = false;
+    let mut rounds = 0u32;
+    while left > goal.triangles {
+        let Some(Reverse(top)) = heap.pop() else {
+            break;
+        };
+        rounds = rounds.wrapping_add(1);
+        if rounds & 0x3ff == 0 {
+            control.progress((first - left) as f64 / (first - goal.triangles) as f64);
+            if control.cancelled() {
+                return Stop::Cancelled;
+            }
+        }
+        let (i, e) = numbering.find(top as u32);
+        let m = &mut meshes[i];
+        if !m.work.mesh.topology().has_edge(e) {
+            continue;
+        }
+        let Some(c) = m.evaluate(e) else { continue };
+        let now = key(c.cost * factors[i], top as u32);
+        if now.0 > top {
+            heap.push(now);
+            continue;
+        }
+        if !m.within_bound(&c) {
+            bounded = true;
+            continue;
+        }
+        let before = m.work.triangles;
+        if m.attempt(e, &c) {
+            left -= before - m.work.triangles;
+            for &x in m.work.mesh.topology().star(c.roles.kept) {
+                if waiting[i].get(x.index()) {
+                    waiting[i].clear(x.index());
+                    heap.push(Reverse((top >> 32 << 32) | numbering.number(i, x) as u64));
+                }
+            }
+        } else {
+            waiting[i].set(e.index());
+        }
+    }
+    match () {
+        _ if left <= goal.triangles => Stop::Target,
+        _ if bounded => Stop::Error,
+        _ => Stop::NoLegalCollapse,
+    }
+}

@@ -1,0 +1,219 @@
+//! The working state of one mesh: positions in a local frame, what may move, what may go.
+
+use crate::options::{MaxError, Options, SimplifyError};
+use glam::DVec3;
+use progmesh_aif::{Bits, EdgeId, FaceId, Marks, Mesh, NONE, VertexId};
+
+/// What a vertex may do.
+///
+/// | onto -> | interior | border | seam | pinned |
+/// |---|---|---|---|---|
+/// | interior | yes | yes | yes, at the seam vertex | yes, at the pinned vertex |
+/// | border | | along a border edge | no | along a border edge |
+/// | seam | | | along a seam edge | along a seam edge |
+/// | pinned | | | | no |
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Kind {
+    /// Free.
+    Interior,
+    /// On exactly one border, and on no seam.
+    Border,
+    /// Inside a chain of seam edges (uv seam, crease, material or group border).
+    Seam,
+    /// Neither moves nor goes: locked, singular, or where seams and borders meet or end.
+    Pinned,
+}
+
+/// One mesh being simplified.
+pub(crate) struct Work<'m> {
+    pub(crate) mesh: &'m mut Mesh,
+    /// Positions about the centre, scaled by a power of two so that the mesh has about unit size.
+    pub(crate) points: Vec<DVec3>,
+    centre: DVec3,
+    /// Model units -> local units; a power of two, so that going there and back is exact.
+    pub(crate) scale: f64,
+    /// Bounding-box diagonal in model units.
+    pub(crate) diagonal: f64,
+    pub(crate) kinds: Vec<Kind>,
+    pub(crate) seams: Bits,
+    /// Vertices whose position is no longer the input's.
+    pub(crate) moved: Bits,
+    pub(crate) marks: Marks,
+    /// Triangles left (a polygon of n corners counts n - 2).
+    pub(crate) triangles: usize,
+}
+
+impl<'m> Work<'m> {
+    /// Takes a mesh and works out what may move. O(n).
+    pub(crate) fn new(mesh: &'m mut Mesh, options: &Options) -> Result<Self, SimplifyError> {
+        let slots = mesh.topology().vertex_slots();
+        let weights = options.vertex_weights.len();
+        if weights != 0 && weights != slots {
+            return Err(SimplifyError::Length { option: "vertex_weights", len: weights, want: slots });
+        }
+        if let Some(&bad) = options.vertex_weights.iter().find(|w| !w.is_finite() || **w < 0.0) {
+            return Err(SimplifyError::Range {
+                option: "a vertex weight",
+                value: bad as f64,
+                range: "finite and not negative",
+            });
+        }
+        let (lo, hi) = mesh.surface_bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
+        let extent = (hi - lo).max_element();
+        // A power of two near 1 / extent: 2^-1022 .. 2^1022 keeps it normal.
+        let scale =
+            if extent > 0.0 { (-extent.log2().round()).clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
+        let centre = lo + (hi - lo) * 0.5;
+        let points = mesh.positions().iter().map(|p| (p - centre) * scale).collect();
+        let diagonal = ((hi - lo) * scale).length() / scale;
+        let triangles = mesh.triangle_count();
+        let seams = find_seams(mesh);
+        let mut work = Work {
+            points,
+            centre,
+            scale,
+            diagonal,
+            kinds: Vec::new(),
+            seams,
+            moved: Bits::new(slots),
+            marks: Marks::default(),
+            triangles,
+            mesh,
+        };
+        work.kinds = work.classify(options);
+        Ok(work)
+    }
+
+    /// The error bound in local units, squared.
+    pub(crate) fn local_bound_squared(&self, bound: MaxError) -> f64 {
+        let model = if bound.relative { bound.value * self.diagonal } else { bound.value };
+        (model * self.scale).powi(2)
+    }
+
+    /// What every vertex may do.
+    fn classify(&self, options: &Options) -> Vec<Kind> {
+        let t = self.mesh.topology();
+        let mut kinds = vec![Kind::Interior; t.vertex_slots()];
+        for v in t.vertices() {
+            let (mut borders, mut seams, mut odd) = (0, 0, false);
+            for &e in t.star(v) {
+                match t.edge_faces(e).len() {
+                    1 => borders += 1,
+                    2 => seams += self.seams.get(e.index()) as u32,
+                    _ => odd = true,
+                }
+            }
+            kinds[v.index()] = match (borders, seams) {
+                _ if odd || !t.is_regular(v) => Kind::Pinned,
+                (0, 0) => Kind::Interior,
+                (0, 2) => Kind::Seam,
+                (2, 0) if options.lock_border => Kind::Pinned,
+                (2, 0) => Kind::Border,
+                _ => Kind::Pinned,
+            };
+            if options.locked_vertices.get(v.index()) {
+                kinds[v.index()] = Kind::Pinned;
+            }
+        }
+        if !(options.locked_materials.is_empty() && options.locked_groups.is_empty()) {
+            for f in t.faces() {
+                let locked = |of: Option<u32>, list: &[u32]| of.is_some_and(|x| list.contains(&x));
+                if locked(self.mesh.material(f), &options.locked_materials)
+                    || locked(self.mesh.group(f), &options.locked_groups)
+                {
+                    t.face_vertices(f).for_each(|v| kinds[v.index()] = Kind::Pinned);
+                }
+            }
+        }
+        kinds
+    }
+
+    /// Which end of `e` is kept, and whether it must stay where it is; `None` when the kinds forbid the collapse.
+    #[inline]
+    pub(crate) fn roles(&self, e: EdgeId) -> Option<Roles> {
+        let t = self.mesh.topology();
+        let [a, b] = t.edge_vertices(e);
+        let (ka, kb) = (self.kinds[a.index()], self.kinds[b.index()]);
+        use Kind::*;
+        Some(match (ka, kb) {
+            (Interior, Interior) => Roles { kept: a, removed: b, fixed: false },
+            (Pinned, Pinned) => return None,
+            (Border, Border) if t.edge_faces(e).len() == 1 => Roles { kept: a, removed: b, fixed: false },
+            (Seam, Seam) if self.seams.get(e.index()) => Roles { kept: a, removed: b, fixed: false },
+            (Border, Interior) => Roles { kept: a, removed: b, fixed: false },
+            (Interior, Border) => Roles { kept: b, removed: a, fixed: false },
+            (Seam | Pinned, Interior) => Roles { kept: a, removed: b, fixed: true },
+            (Interior, Seam | Pinned) => Roles { kept: b, removed: a, fixed: true },
+            (Pinned, Border) if t.edge_faces(e).len() == 1 => Roles { kept: a, removed: b, fixed: true },
+            (Border, Pinned) if t.edge_faces(e).len() == 1 => Roles { kept: b, removed: a, fixed: true },
+            (Pinned, Seam) if self.seams.get(e.index()) => Roles { kept: a, removed: b, fixed: true },
+            (Seam, Pinned) if self.seams.get(e.index()) => Roles { kept: b, removed: a, fixed: true },
+            _ => return None,
+        })
+    }
+
+    /// Whether collapsing `e` would merge two seams, or a seam into a border.
+    #[inline]
+    pub(crate) fn pinches_seam(&self, e: EdgeId) -> bool {
+        let t = self.mesh.topology();
+        let feature = |x: EdgeId| self.seams.get(x.index()) || t.edge_faces(x).len() == 1;
+        self.seams.count() > 0
+            && t.edge_faces(e).iter().any(|&f| {
+                let features = t.face_edges(f).iter().filter(|u| u.edge() != e && feature(u.edge())).count();
+                t.corner_range(f).len() == 3 && features == 2
+            })
+    }
+
+    /// Writes moved positions back to the mesh, in its precision.
+    pub(crate) fn write_back(&mut self) {
+        for v in 0..self.points.len() {
+            if self.moved.get(v) {
+                let p = self.points[v] / self.scale + self.centre;
+                self.mesh.positions_mut().set(v, p);
+            }
+        }
+    }
+}
+
+/// Who stays and who goes when an edge collapses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Roles {
+    pub(crate) kept: VertexId,
+    pub(crate) removed: VertexId,
+    /// The kept vertex must stay where it is.
+    pub(crate) fixed: bool,
+}
+
+/// Regular edges across which attributes, material or group change.
+fn find_seams(mesh: &Mesh) -> Bits {
+    let t = mesh.topology();
+    let mut seams = Bits::new(t.edge_slots());
+    let wedges = mesh.wedges();
+    let differs = |per_face: &[u32], f: FaceId, g: FaceId| {
+        let of = |f: FaceId| per_face.get(f.index()).copied().unwrap_or(NONE);
+        of(f) != of(g)
+    };
+    if wedges.is_none() && mesh.face_materials().is_empty() && mesh.face_groups().is_empty() {
+        return seams;
+    }
+    for e in t.edges() {
+        let &[f, g] = t.edge_faces(e) else { continue };
+        let torn = wedges.is_some_and(|w| {
+            t.edge_vertices(e)
+                .iter()
+                .any(|&v| !w.same(wedge_at(mesh, w, f, v), wedge_at(mesh, w, g, v)))
+        });
+        if torn || differs(mesh.face_materials(), f, g) || differs(mesh.face_groups(), f, g) {
+            seams.set(e.index());
+        }
+    }
+    seams
+}
+
+/// The wedge of face `f` at vertex `v`.
+pub(crate) fn wedge_at(mesh: &Mesh, wedges: &progmesh_aif::Wedges, f: FaceId, v: VertexId) -> u32 {
+    let t = mesh.topology();
+    let range = t.corner_range(f);
+    t.face_vertices(f).position(|x| x == v).map_or(NONE, |i| wedges.corner[range.start + i])
+}
