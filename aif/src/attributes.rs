@@ -226,6 +226,22 @@ impl Wedges {
         }
     }
 
+    /// The wedges `old[i]`, in that order, with these corners.
+    pub(crate) fn gather(&self, old: &[u32], corner: Vec<u32>) -> Self {
+        let mut values = Vec::with_capacity(old.len() * self.stride);
+        for &w in old {
+            values.extend_from_slice(self.row(w));
+        }
+        Wedges {
+            channels: self.channels.clone(),
+            offsets: self.offsets.clone(),
+            stride: self.stride,
+            values,
+            present: old.iter().map(|&w| self.present(w)).collect(),
+            corner,
+        }
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         4 * (self.values.len() + self.corner.len()) + 8 * self.present.len()
@@ -238,7 +254,8 @@ mod tests {
 
     fn two_channels() -> Wedges {
         let mut w =
-            Wedges::new(vec![Channel::new(Semantic::Normal, 3), Channel::new(Semantic::TexCoord(0), 2)]).unwrap();
+            Wedges::new(vec![Channel::new(Semantic::Normal, 3), Channel::new(Semantic::TexCoord(0), 2)])
+                .unwrap();
         w.push(&[0.0, 0.0, 1.0, 0.25, 0.5], 0b11);
         w.push(&[-0.0, 0.0, 1.0, 0.25, 0.5], 0b11);
         w.push(&[0.0, 0.0, 1.0, 0.0, 0.0], 0b01);

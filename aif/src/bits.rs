@@ -45,6 +45,14 @@ impl Bits {
         self.ones
     }
 
+    /// True if the count is that of the bits, and none is set at `n` or beyond.
+    pub(crate) fn is_consistent(&self, n: usize) -> bool {
+        let ones: usize = self.words.iter().map(|w| w.count_ones() as usize).sum();
+        let top = self.words.iter().rposition(|&w| w != 0);
+        let end = top.map_or(0, |i| 64 * i + 64 - self.words[i].leading_zeros() as usize);
+        ones == self.ones && end <= n
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         8 * self.words.len()
@@ -65,5 +73,15 @@ mod tests {
         b.clear(3);
         b.clear(3);
         assert_eq!((b.count(), b.get(3)), (1, false));
+    }
+    #[test]
+    fn consistency_is_of_count_and_range() {
+        let mut b = Bits::new(100);
+        assert!(b.is_consistent(0));
+        b.set(64);
+        assert!(b.is_consistent(65));
+        assert!(!b.is_consistent(64));
+        b.ones = 2;
+        assert!(!b.is_consistent(65));
     }
 }

@@ -35,7 +35,11 @@ pub struct MeshInput {
 impl MeshInput {
     /// Triangles without attributes.
     pub fn triangles(positions: impl Into<Positions>, triangles: &[[u32; 3]]) -> Self {
-        MeshInput { positions: positions.into(), corners: triangles.as_flattened().to_vec(), ..Default::default() }
+        MeshInput {
+            positions: positions.into(),
+            corners: triangles.as_flattened().to_vec(),
+            ..Default::default()
+        }
     }
 
     /// Polygons without attributes: the size of every face, and all corners.
@@ -130,17 +134,21 @@ impl Mesh {
         input.wires.retain(|w| w[0] != w[1]);
         report.dropped_wires = wires - input.wires.len();
 
-        let sizes = input.face_sizes.take().filter(|s| s.iter().any(|&n| n != 3));
-        let topology = build_topology(input.positions.len(), sizes.as_deref(), &input.corners, &input.wires)?;
-        let mesh = Mesh {
-            topology,
-            positions: input.positions,
-            wedges: input.wedges,
-            face_material: input.face_material,
-            face_group: input.face_group,
-        };
-        Ok((mesh, report))
+        Ok((assemble(input)?, report))
     }
+}
+
+/// The mesh of an input that is valid and clean: indices in range, faces simple cycles, wires of two vertices.
+pub(crate) fn assemble(input: MeshInput) -> Result<Mesh, BuildError> {
+    let sizes = input.face_sizes.filter(|s| s.iter().any(|&n| n != 3));
+    let topology = build_topology(input.positions.len(), sizes.as_deref(), &input.corners, &input.wires)?;
+    Ok(Mesh {
+        topology,
+        positions: input.positions,
+        wedges: input.wedges,
+        face_material: input.face_material,
+        face_group: input.face_group,
+    })
 }
 
 /// Refuses what no mesh can be built from, naming the element.
@@ -159,7 +167,7 @@ fn validate(input: &MeshInput) -> Result<(), BuildError> {
         return Err(BuildError::NotFinite { vertex, axis: b"xyz"[axis] as char, value: p[axis] });
     }
     let faces = match &input.face_sizes {
-        None if input.corners.len() % 3 != 0 => {
+        None if !input.corners.len().is_multiple_of(3) => {
             return Err(BuildError::NotTriangles { corners: input.corners.len() });
         }
         None => input.corners.len() / 3,
@@ -184,7 +192,9 @@ fn validate(input: &MeshInput) -> Result<(), BuildError> {
             c += n;
         }
     }
-    if let Some((wire, w)) = input.wires.iter().enumerate().find(|(_, w)| w.iter().any(|&v| v as usize >= vertices)) {
+    if let Some((wire, w)) =
+        input.wires.iter().enumerate().find(|(_, w)| w.iter().any(|&v| v as usize >= vertices))
+    {
         let index = w[0].max(w[1]);
         return Err(BuildError::WireOutOfRange { wire, index, vertices });
     }
@@ -200,7 +210,11 @@ fn validate(input: &MeshInput) -> Result<(), BuildError> {
     }
     if let Some(w) = &input.wedges {
         if w.corner.len() != input.corners.len() {
-            return Err(BuildError::Length { name: "wedges.corner", len: w.corner.len(), want: input.corners.len() });
+            return Err(BuildError::Length {
+                name: "wedges.corner",
+                len: w.corner.len(),
+                want: input.corners.len(),
+            });
         }
         if let Some(corner) = w.corner.iter().position(|&x| x != NONE && x as usize >= w.len()) {
             return Err(BuildError::WedgeOutOfRange { corner, index: w.corner[corner], wedges: w.len() });

@@ -71,7 +71,9 @@ pub enum BuildError {
         want: usize,
     },
     /// More elements than 32-bit ids can name. Split the mesh.
-    #[error("{vertices} vertices and {corners} corners: a mesh holds at most 2^32 - 1 vertices and 2^31 - 1 edges")]
+    #[error(
+        "{vertices} vertices and {corners} corners: a mesh holds at most 2^32 - 1 vertices and 2^31 - 1 edges"
+    )]
     TooLarge {
         /// Number of vertices.
         vertices: usize,

@@ -19,21 +19,27 @@
 pub mod attributes;
 mod bits;
 mod build;
+mod check;
+mod compact;
 mod edit;
 mod error;
 mod ids;
 mod mesh;
 pub mod positions;
 mod topology;
+mod triangulate;
 mod weld;
 
 pub use attributes::{Channel, Encoding, Semantic, TooManyChannels, Wedges};
 pub use bits::Bits;
 pub use build::{BuildOptions, BuildReport, MeshInput};
+pub use check::CheckError;
+pub use compact::{CompactOptions, IdMaps};
 pub use edit::{Collapse, CollapseRecord, LinkViolation, Marks, Wing};
 pub use error::BuildError;
 pub use ids::{EdgeId, FaceId, NONE, VertexId, WedgeId};
 pub use mesh::Mesh;
 pub use positions::Positions;
 pub use topology::{EdgeUse, Topology};
+pub use triangulate::{Triangulated, triangulate_polygon};
 pub use weld::Weld;

@@ -105,10 +105,7 @@ impl Mesh {
     /// The live triangles, as vertex indices; polygons are left out (triangulate first).
     pub fn triangles(&self) -> Vec<[u32; 3]> {
         let t = &self.topology;
-        t.faces()
-            .filter(|&f| t.corner_range(f).len() == 3)
-            .map(|f| t.triangle(f).map(|v| v.0))
-            .collect()
+        t.faces().filter(|&f| t.corner_range(f).len() == 3).map(|f| t.triangle(f).map(|v| v.0)).collect()
     }
 
     /// Least and greatest coordinates of the live vertices; `None` if there is none.
