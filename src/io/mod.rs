@@ -4,7 +4,9 @@
 //! encoder returns bytes. What a format cannot hold, or what was changed on the way in, is a warning, never silent.
 
 pub mod files;
+pub(crate) mod flatten;
 pub mod gltf;
+pub(crate) mod notes;
 pub mod obj;
 pub mod off;
 pub mod ply;

@@ -166,6 +166,13 @@ impl<'a> Cursor<'a> {
         }
     }
 
+    /// Goes to the end of this line, whatever it holds: a backslash does not continue a comment.
+    pub(crate) fn skip_comment(&mut self) {
+        while self.peek().is_some_and(|b| !is_eol(b)) {
+            self.at += 1;
+        }
+    }
+
     /// What is left of this line, without blanks around it, as text; continuations become spaces. The cursor goes to the line's end.
     pub(crate) fn rest_of_line(&mut self) -> String {
         self.skip_blanks();
