@@ -177,7 +177,7 @@ impl Topology {
         (0..self.face_slots() as u32).map(FaceId).filter(|f| !self.dead_faces.get(f.index()))
     }
 
-    /// Vertex -> incident edges, in storage order (no rotational order; see [`crate::Mesh::fans`]).
+    /// Vertex -> incident edges, in storage order (no rotational order; see [`Topology::fans`]).
     #[inline]
     pub fn star(&self, v: VertexId) -> &[EdgeId] {
         &self.star_pool[self.stars[v.index()].span.range()]
