@@ -81,7 +81,8 @@ pub struct BuildReport {
     pub dropped_faces: Vec<u32>,
     /// Faces with a vertex twice in a row, of which the repetition was left out; input ids.
     pub shortened_faces: Vec<u32>,
-    /// Faces that visit a vertex twice and were split into simple cycles there; input ids.
+    /// Faces that visit a vertex twice and were split into simple cycles there, those of fewer than three vertices left
+    /// out; input ids.
     pub split_faces: Vec<u32>,
     /// Wires left out because both ends are one vertex.
     pub dropped_wires: usize,
@@ -172,8 +173,8 @@ fn validate(input: &MeshInput) -> Result<(), BuildError> {
         }
         None => input.corners.len() / 3,
         Some(s) => {
-            let sum: usize = s.iter().map(|&n| n as usize).sum();
-            if sum != input.corners.len() {
+            let sum: u64 = s.iter().map(|&n| n as u64).sum();
+            if sum != input.corners.len() as u64 {
                 return Err(BuildError::Sizes { sum, corners: input.corners.len() });
             }
             s.len()
@@ -226,23 +227,15 @@ fn validate(input: &MeshInput) -> Result<(), BuildError> {
 /// Makes every face a simple cycle of at least three vertices, reporting each that was not.
 fn clean_faces(input: &mut MeshInput, report: &mut BuildReport) {
     let faces = input.face_count();
+    let mut sorted = Vec::new();
     let clean = match &input.face_sizes {
-        None => input.corners.as_chunks::<3>().0.iter().all(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]),
+        None => input.corners.as_chunks::<3>().0.iter().all(|t| is_simple(t, &mut sorted)),
         Some(s) => {
-            let mut c = 0;
-            let mut sorted = Vec::new();
+            let mut rest = &input.corners[..];
             s.iter().all(|&n| {
-                let face = &input.corners[c..c + n as usize];
-                c += n as usize;
-                match *face {
-                    [x, y, z] => x != y && y != z && z != x,
-                    _ => {
-                        sorted.clear();
-                        sorted.extend_from_slice(face);
-                        sorted.sort_unstable();
-                        n >= 3 && sorted.windows(2).all(|w| w[0] != w[1])
-                    }
-                }
+                let (face, after) = rest.split_at(n as usize);
+                rest = after;
+                is_simple(face, &mut sorted)
             })
         }
     };
@@ -261,9 +254,18 @@ fn clean_faces(input: &mut MeshInput, report: &mut BuildReport) {
         let n = sizes.as_ref().map_or(3, |s| s[face] as usize);
         let slots = start..start + n;
         start += n;
+        if is_simple(&old[slots.clone()], &mut sorted) {
+            new_sizes.push(n as u32);
+            map.push(face as u32);
+            input.corners.extend_from_slice(&old[slots.clone()]);
+            if let Some(w) = &old_wedge {
+                wedge.extend_from_slice(&w[slots]);
+            }
+            continue;
+        }
         // Drop what repeats the corner before it.
         let mut kept: Vec<usize> = Vec::with_capacity(n);
-        for c in slots.clone() {
+        for c in slots {
             if kept.last().is_none_or(|&l| old[l] != old[c]) {
                 kept.push(c);
             }
@@ -318,6 +320,21 @@ fn clean_faces(input: &mut MeshInput, report: &mut BuildReport) {
     report.face_map = Some(map);
 }
 
+/// True if a face has at least three vertices, none of them twice. `sorted` is scratch.
+fn is_simple(face: &[u32], sorted: &mut Vec<u32>) -> bool {
+    match *face {
+        [] | [_] | [_, _] => false,
+        [x, y, z] => x != y && y != z && z != x,
+        [x, y, z, w] => x != y && x != z && x != w && y != z && y != w && z != w,
+        _ => {
+            sorted.clear();
+            sorted.extend_from_slice(face);
+            sorted.sort_unstable();
+            sorted.windows(2).all(|w| w[0] != w[1])
+        }
+    }
+}
+
 /// Buckets longer than this are sorted instead of scanned.
 const LONG_BUCKET: usize = 48;
 
@@ -346,28 +363,9 @@ fn build_topology(
     }
 
     // Half-edges to the bucket of their lower vertex, as (upper vertex, corner); wires as corners past the end.
-    let each_half_edge = |emit: &mut dyn FnMut(u32, u32, u32)| match sizes {
-        None => triangles_half_edges(corners, emit),
-        Some(_) => {
-            for s in &face_spans {
-                let r = s.range();
-                for c in r.clone() {
-                    let next = if c + 1 == r.end { r.start } else { c + 1 };
-                    emit(corners[c], corners[next], c as u32);
-                }
-            }
-        }
-    };
+    let spans = sizes.map(|_| &face_spans[..]);
     let mut bucket_end = vec![0u32; vertices + 1];
-    if sizes.is_none() {
-        for &[x, y, z] in corners.as_chunks::<3>().0 {
-            bucket_end[x.min(y) as usize] += 1;
-            bucket_end[y.min(z) as usize] += 1;
-            bucket_end[z.min(x) as usize] += 1;
-        }
-    } else {
-        each_half_edge(&mut |u, v, _| bucket_end[u.min(v) as usize] += 1);
-    }
+    for_each_half_edge(spans, corners, |u, v, _| bucket_end[u.min(v) as usize] += 1);
     for w in wires {
         bucket_end[w[0].min(w[1]) as usize] += 1;
     }
@@ -384,16 +382,7 @@ fn build_topology(
             bucket[*at as usize] = (u.max(v) as u64) << 32 | c as u64;
             *at += 1;
         };
-        if sizes.is_none() {
-            for (f, &[x, y, z]) in corners.as_chunks::<3>().0.iter().enumerate() {
-                let c = 3 * f as u32;
-                put(x, y, c);
-                put(y, z, c + 1);
-                put(z, x, c + 2);
-            }
-        } else {
-            each_half_edge(&mut put);
-        }
+        for_each_half_edge(spans, corners, &mut put);
         for (i, w) in wires.iter().enumerate() {
             put(w[0], w[1], (corners.len() + i) as u32);
         }
@@ -492,11 +481,25 @@ fn build_topology(
     })
 }
 
-fn triangles_half_edges(corners: &[u32], emit: &mut dyn FnMut(u32, u32, u32)) {
-    for (f, &[x, y, z]) in corners.as_chunks::<3>().0.iter().enumerate() {
-        let c = 3 * f as u32;
-        emit(x, y, c);
-        emit(y, z, c + 1);
-        emit(z, x, c + 2);
+/// Calls `emit` with both ends and the corner of every half-edge, in order. Compiled for each use: the triangles' loop is the hot one.
+#[inline(always)]
+fn for_each_half_edge(spans: Option<&[Span]>, corners: &[u32], mut emit: impl FnMut(u32, u32, u32)) {
+    let Some(spans) = spans else {
+        for (f, &[x, y, z]) in corners.as_chunks::<3>().0.iter().enumerate() {
+            let c = 3 * f as u32;
+            emit(x, y, c);
+            emit(y, z, c + 1);
+            emit(z, x, c + 2);
+        }
+        return;
+    };
+    for s in spans {
+        let face = &corners[s.range()];
+        for (i, pair) in face.windows(2).enumerate() {
+            emit(pair[0], pair[1], s.start + i as u32);
+        }
+        if let [first, .., last] = *face {
+            emit(last, first, s.start + s.len - 1);
+        }
     }
 }

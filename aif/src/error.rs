@@ -56,7 +56,7 @@ pub enum BuildError {
     #[error("face sizes add up to {sum}, but there are {corners} corners")]
     Sizes {
         /// Sum of the sizes.
-        sum: usize,
+        sum: u64,
         /// Length of the index list.
         corners: usize,
     },
