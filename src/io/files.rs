@@ -1,1 +1,416 @@
-//! (being written)
+//! Paths: the only file that touches the file system.
+//!
+//! Reading takes a path or `-` for standard input. Writing is all or nothing: every file is first written whole to a temporary
+//! file in its own directory, then all are renamed, those beside the main file first, the main file last. What fails before the
+//! first rename changes nothing. No `fsync`: the guarantee is against errors and interrupts, not against power loss.
+
+use super::{DecodeError, Decoded, EncodeError, EncodeOptions, Encoded, Format, NoSide, Side, decode, encode};
+use crate::scene::Scene;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, ErrorKind, Read, Write};
+use std::path::{Component, Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Stands for standard input or output in place of a path.
+pub const DASH: &str = "-";
+
+/// A file that was read.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Loaded {
+    /// Its content, and what was said about it.
+    pub decoded: Decoded,
+    /// The format it was read as.
+    pub format: Format,
+    /// Its size.
+    pub bytes: usize,
+}
+
+/// Why a file could not be read. The caller knows its name.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// Neither the name nor the caller says what it is.
+    #[error("the name does not tell the format; say it (obj, gltf, glb, ply, stl, off)")]
+    UnknownFormat,
+    /// The system refused.
+    #[error("{0}")]
+    Io(io::Error),
+    /// The content is wrong.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+}
+
+/// Why a file could not be written. Nothing was changed, unless the variant says so.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// Neither the name nor the caller says what it is to be.
+    #[error("the name does not tell the format; say it (obj, gltf, glb, ply, stl, off)")]
+    UnknownFormat,
+    /// The format cannot hold the scene.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// Files would have to stand beside standard output.
+    #[error("needs files beside it ({0}), which standard output cannot give; write to a path, or as glb")]
+    SideOfStdout(String),
+    /// The encoder named a file that does not lie beside or below the output.
+    #[error("{0}: a file beside the output must have a relative name without `..`")]
+    SideName(String),
+    /// The system refused. When it did so at the second or a later rename, the files renamed before are new.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The caller asked to stop before anything was changed.
+    #[error("interrupted; nothing was written")]
+    Cancelled,
+}
+
+impl WriteError {
+    /// True if whoever read our output has gone away, which is no fault.
+    pub fn is_broken_pipe(&self) -> bool {
+        matches!(self, WriteError::Io { source, .. } if source.kind() == ErrorKind::BrokenPipe)
+    }
+}
+
+/// Reads a mesh file, by the name's extension if `format` is `None`. `-` is standard input, and needs a format.
+pub fn read(path: &Path, format: Option<Format>) -> Result<Loaded, ReadError> {
+    let format = format.or_else(|| Format::from_name(&path.to_string_lossy())).ok_or(ReadError::UnknownFormat)?;
+    let bytes = read_bytes(path).map_err(ReadError::Io)?;
+    let decoded = if is_dash(path) {
+        decode(format, &bytes, &NoSide)?
+    } else {
+        decode(format, &bytes, &Beside::of(path))?
+    };
+    Ok(Loaded { decoded, format, bytes: bytes.len() })
+}
+
+/// Reads a mesh file by its extension: its scene, and the warnings.
+pub fn read_scene(path: impl AsRef<Path>) -> Result<Decoded, ReadError> {
+    read(path.as_ref(), None).map(|l| l.decoded)
+}
+
+/// Writes a mesh file by its extension. Returns the warnings: what the format cannot hold.
+pub fn write_scene(path: impl AsRef<Path>, scene: &Scene) -> Result<Vec<String>, WriteError> {
+    let path = path.as_ref();
+    let format = Format::from_name(&path.to_string_lossy()).ok_or(WriteError::UnknownFormat)?;
+    let mut encoded = encode(format, scene, &encode_options(path, false))?;
+    let mut warnings = std::mem::take(&mut encoded.warnings);
+    warnings.extend(write(path, format, &encoded, &|| false)?);
+    Ok(warnings)
+}
+
+/// Encoding options for this output: the stem of its name.
+pub fn encode_options(path: &Path, text: bool) -> EncodeOptions {
+    let stem = if is_dash(path) { None } else { path.file_stem() };
+    EncodeOptions { text, stem: stem.map_or_else(|| "mesh".into(), |s| s.to_string_lossy().into_owned()) }
+}
+
+/// True for `-`.
+pub fn is_dash(path: &Path) -> bool {
+    path.as_os_str() == DASH
+}
+
+fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    if is_dash(path) {
+        let mut bytes = Vec::new();
+        io::stdin().lock().read_to_end(&mut bytes)?;
+        return Ok(bytes);
+    }
+    if fs::metadata(path)?.is_dir() {
+        return Err(io::Error::new(ErrorKind::IsADirectory, "is a directory"));
+    }
+    fs::read(path)
+}
+
+/// Files in the directory of an input, and below it.
+///
+/// Absolute names, names with a scheme (`http:`), and `..` out of the directory are refused: a mesh file from elsewhere must not be
+/// able to pull in whatever the user can read. Names are tried as written, then with `%20` and the like decoded.
+#[derive(Clone, Debug)]
+pub struct Beside {
+    directory: PathBuf,
+}
+
+impl Beside {
+    /// The files beside `path`.
+    pub fn of(path: &Path) -> Self {
+        Beside { directory: directory_of(path).to_path_buf() }
+    }
+}
+
+impl Side for Beside {
+    fn load(&self, name: &str) -> io::Result<Vec<u8>> {
+        let refused = |why: &str| io::Error::new(ErrorKind::PermissionDenied, format!("not read: {why}"));
+        let read = |name: &str| {
+            let below = relative_below(name).map_err(refused)?;
+            let path = self.directory.join(below);
+            match fs::metadata(&path)?.is_file() {
+                true => fs::read(path),
+                false => Err(refused("is no regular file")),
+            }
+        };
+        match (read(name), percent_decoded(name)) {
+            (Err(e), Some(decoded)) if e.kind() == ErrorKind::NotFound => read(&decoded),
+            (result, _) => result,
+        }
+    }
+}
+
+/// `name` as a path that stays in its directory, or why it does not.
+fn relative_below(name: &str) -> Result<PathBuf, &'static str> {
+    // Files made on Windows name their textures with backslashes.
+    let name = name.replace('\\', "/");
+    let drive = name.as_bytes().get(1) == Some(&b':');
+    if name.starts_with('/') || drive {
+        return Err("its name is absolute; only files beside the input and below are read");
+    }
+    if name.contains("://") {
+        return Err("its name is a URL; nothing is fetched");
+    }
+    let mut path = PathBuf::new();
+    for part in Path::new(&name).components() {
+        match part {
+            Component::Normal(p) => path.push(p),
+            Component::CurDir => {}
+            Component::ParentDir if path.pop() => {}
+            _ => return Err("`..` leads out of the input's directory; only files beside it and below are read"),
+        }
+    }
+    if path.as_os_str().is_empty() { Err("it has no name") } else { Ok(path) }
+}
+
+/// `name` with `%XX` decoded; `None` if there is none, or the result is no UTF-8.
+fn percent_decoded(name: &str) -> Option<String> {
+    if !name.contains('%') {
+        return None;
+    }
+    let hex = |b: Option<&u8>| b.and_then(|&b| (b as char).to_digit(16)).map(|d| d as u8);
+    let bytes = name.as_bytes();
+    let mut out = Vec::with_capacity(bytes.len());
+    let mut i = 0;
+    while i < bytes.len() {
+        match (bytes[i], hex(bytes.get(i + 1)), hex(bytes.get(i + 2))) {
+            (b'%', Some(high), Some(low)) => {
+                out.push(high << 4 | low);
+                i += 3;
+            }
+            (b, ..) => {
+                out.push(b);
+                i += 1;
+            }
+        }
+    }
+    String::from_utf8(out).ok().filter(|s| !s.contains('\0'))
+}
+
+/// Writes what was encoded, all or nothing. `-` is standard output. `cancelled` is asked once, before the first change.
+///
+/// Returns warnings: files beside the main one that standard output has no place for.
+pub fn write(
+    path: &Path,
+    format: Format,
+    encoded: &Encoded,
+    cancelled: &dyn Fn() -> bool,
+) -> Result<Vec<String>, WriteError> {
+    let at = |path: &Path| {
+        let path = path.to_path_buf();
+        move |source| WriteError::Io { path, source }
+    };
+    if is_dash(path) {
+        let names: Vec<&str> = encoded.side.iter().map(|s| s.0.as_str()).collect();
+        if format == Format::Gltf && !names.is_empty() {
+            return Err(WriteError::SideOfStdout(names.join(", ")));
+        }
+        if cancelled() {
+            return Err(WriteError::Cancelled);
+        }
+        let mut out = io::stdout().lock();
+        out.write_all(&encoded.bytes).and_then(|()| out.flush()).map_err(at(Path::new("standard output")))?;
+        return Ok(match names.is_empty() {
+            true => vec![],
+            false => vec![format!("{} not written: standard output has room for one file only", names.join(", "))],
+        });
+    }
+    let directory = directory_of(path);
+    let mut staged = Vec::with_capacity(encoded.side.len() + 1);
+    for (name, bytes) in &encoded.side {
+        let below = relative_below(name).map_err(|_| WriteError::SideName(name.clone()))?;
+        let target = directory.join(below);
+        if let Some(parent) = target.parent() {
+            fs::create_dir_all(parent).map_err(at(parent))?;
+        }
+        staged.push(Staged::write(&target, bytes).map_err(at(&target))?);
+    }
+    staged.push(Staged::write(path, &encoded.bytes).map_err(at(path))?);
+    if cancelled() {
+        return Err(WriteError::Cancelled);
+    }
+    for s in staged {
+        let target = s.target.clone();
+        s.publish().map_err(at(&target))?;
+    }
+    Ok(vec![])
+}
+
+/// Writes one file of text or bytes, all or nothing; its directory is made.
+pub fn write_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    fs::create_dir_all(directory_of(path))?;
+    Staged::write(path, bytes)?.publish()
+}
+
+fn directory_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    }
+}
+
+/// A file written under a temporary name; removed again unless published.
+struct Staged {
+    target: PathBuf,
+    /// `None` when the target is no regular file (`/dev/null`, a pipe): it must not be replaced, and was written directly.
+    temporary: Option<PathBuf>,
+}
+
+impl Staged {
+    fn write(target: &Path, bytes: &[u8]) -> io::Result<Staged> {
+        static COUNT: AtomicU64 = AtomicU64::new(0);
+        // Through a symbolic link, so that what it points at is replaced and not the link.
+        let target = fs::canonicalize(target).unwrap_or_else(|_| target.to_path_buf());
+        let existing = fs::metadata(&target).ok();
+        if existing.as_ref().is_some_and(|m| m.is_dir()) {
+            return Err(io::Error::new(ErrorKind::IsADirectory, "is a directory"));
+        }
+        if existing.as_ref().is_some_and(|m| !m.is_file()) {
+            OpenOptions::new().write(true).open(&target)?.write_all(bytes)?;
+            return Ok(Staged { target, temporary: None });
+        }
+        let (mut file, staged) = loop {
+            let n = COUNT.fetch_add(1, Ordering::Relaxed);
+            // Short whatever the target's name, which may be as long as the system allows.
+            let name = format!(".progmesh-{}-{n}.tmp", std::process::id());
+            let temporary = directory_of(&target).join(name);
+            match File::create_new(&temporary) {
+                Ok(file) => break (file, Staged { target, temporary: Some(temporary) }),
+                Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+                Err(e) => return Err(e),
+            }
+        };
+        file.write_all(bytes)?;
+        if let Some(m) = existing {
+            // A file that is replaced keeps its mode. Where that is not allowed the default will do.
+            let _ = file.set_permissions(m.permissions());
+        }
+        Ok(staged)
+    }
+
+    fn publish(mut self) -> io::Result<()> {
+        if let Some(temporary) = &self.temporary {
+            fs::rename(temporary, &self.target)?;
+        }
+        self.temporary = None;
+        Ok(())
+    }
+}
+
+impl Drop for Staged {
+    fn drop(&mut self) {
+        if let Some(t) = &self.temporary {
+            let _ = fs::remove_file(t);
+        }
+    }
+}
+
+/// The most memory this process has held so far, in bytes; `None` where the system does not tell (all but Linux).
+pub fn peak_bytes() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kb| 1024 * kb)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_leave_the_directory_are_refused() {
+        for bad in ["/etc/passwd", "..", "../x", "a/../../x", "C:\\x", "\\x", "http://h/x", "", "."] {
+            assert!(relative_below(bad).is_err(), "{bad}");
+        }
+        assert_eq!(relative_below("a\\b.png").unwrap(), Path::new("a/b.png"));
+        assert_eq!(relative_below("./a/../b.png").unwrap(), Path::new("b.png"));
+    }
+
+    #[test]
+    fn percent_signs_are_decoded_only_where_they_code() {
+        assert_eq!(percent_decoded("a%20b%2Fc").as_deref(), Some("a b/c"));
+        assert_eq!(percent_decoded("100%").as_deref(), Some("100%"));
+        assert_eq!(percent_decoded("plain"), None);
+        assert_eq!(percent_decoded("%ff"), None);
+        assert_eq!(percent_decoded("%00"), None);
+    }
+
+    #[test]
+    fn side_files_are_found_as_written_and_decoded_but_not_outside() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::create_dir(dir.path().join("in")).unwrap();
+        fs::write(dir.path().join("in/a b.bin"), b"1").unwrap();
+        fs::write(dir.path().join("in/50%25.bin"), b"2").unwrap();
+        fs::write(dir.path().join("secret"), b"3").unwrap();
+        let side = Beside::of(&dir.path().join("in/x.gltf"));
+        assert_eq!(side.load("a%20b.bin").unwrap(), b"1");
+        assert_eq!(side.load("50%25.bin").unwrap(), b"2");
+        assert_eq!(side.load("../secret").unwrap_err().kind(), ErrorKind::PermissionDenied);
+        assert_eq!(side.load("%2e%2e/secret").unwrap_err().kind(), ErrorKind::PermissionDenied);
+        assert_eq!(side.load("none").unwrap_err().kind(), ErrorKind::NotFound);
+    }
+
+    #[test]
+    fn a_failed_or_cancelled_write_leaves_the_old_files_and_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let (out, side) = (dir.path().join("o.obj"), dir.path().join("o.mtl"));
+        fs::write(&out, b"old").unwrap();
+        let encoded = Encoded {
+            bytes: b"new".to_vec(),
+            side: vec![("o.mtl".into(), b"mtl".to_vec())],
+            ..Default::default()
+        };
+        assert!(matches!(write(&out, Format::Obj, &encoded, &|| true), Err(WriteError::Cancelled)));
+        fs::create_dir(&side).unwrap();
+        assert!(matches!(write(&out, Format::Obj, &encoded, &|| false), Err(WriteError::Io { .. })));
+        fs::remove_dir(&side).unwrap();
+        assert_eq!(fs::read(&out).unwrap(), b"old");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+
+        write(&out, Format::Obj, &encoded, &|| false).unwrap();
+        assert_eq!((fs::read(&out).unwrap(), fs::read(&side).unwrap()), (b"new".to_vec(), b"mtl".to_vec()));
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn an_encoder_cannot_write_outside() {
+        let dir = tempfile::tempdir().unwrap();
+        let encoded = Encoded { side: vec![("../x".into(), vec![])], ..Default::default() };
+        let r = write(&dir.path().join("o.obj"), Format::Obj, &encoded, &|| false);
+        assert!(matches!(r, Err(WriteError::SideName(_))));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_written_through_and_a_device_not_replaced() {
+        let dir = tempfile::tempdir().unwrap();
+        let (real, link) = (dir.path().join("real"), dir.path().join("link"));
+        fs::write(&real, b"old").unwrap();
+        std::os::unix::fs::symlink(&real, &link).unwrap();
+        write_file(&link, b"new").unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&real).unwrap(), b"new");
+        write_file(Path::new("/dev/null"), b"x").unwrap();
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+    }
+}
