@@ -6,4 +6,5 @@ pub use progmesh_refine as refine;
 pub use progmesh_simplify as simplify;
 
 pub mod io;
+pub mod normals;
 pub mod scene;

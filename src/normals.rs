@@ -98,7 +98,10 @@ fn recompute(input: &mut MeshInput, crease: f64) -> Result<(), TooManyChannels> 
             if let Some(t) = tangent.filter(|&t| present >> t & 1 == 1) {
                 let o = new.offset(t);
                 let old = Vec3::from_slice(&row[o..o + 3]);
-                let square = (old - n * n.dot(old)).try_normalize().unwrap_or_else(|| n.any_orthonormal_vector());
+                let square = old - n * n.dot(old);
+                // A tangent along the new normal leaves but rounding: any direction is as good.
+                let along = square.length_squared() <= 1e-8 * old.length_squared();
+                let square = if along { n.any_orthonormal_vector() } else { square.normalize_or(Vec3::X) };
                 row[o..o + 3].copy_from_slice(&square.to_array());
             }
             new.push(&row, present)

@@ -1,0 +1,394 @@
+//! Simplifying a whole scene: build every mesh, simplify them all to one target, write the arrays back.
+//!
+//! This is what `progmesh simplify` does between reading and writing; on a mesh of your own, use [`crate::simplify`] directly.
+
+use crate::aif::{BuildError, BuildOptions, BuildReport, CheckError, Mesh, MeshInput, Weld};
+use crate::normals::{self, Normals};
+use crate::scene::{Scene, SceneMesh};
+use crate::simplify::{self, Control, Level, Options, Outcome, Refused, SimplifyError, Stop};
+use std::time::Instant;
+
+mod locks;
+mod scale;
+
+pub use scale::world_scales;
+
+/// What to do with a scene. Start from `Job::default()` and set what differs.
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub struct Job {
+    /// Method, targets, locks. The numbers of locked materials are those of [`Scene::materials`]; locked groups and everything
+    /// by vertex make sense for a scene of one mesh only, and are better given by the fields below.
+    ///
+    /// Errors are measured in world units (see [`world_scales`]); a relative one is relative to the diagonal of the scene.
+    pub options: Options,
+    /// Which vertices are one. Scenes from glTF are welded bit-equal at the least: a glTF mesh is cut at every seam.
+    pub weld: Weld,
+    /// What becomes of the normals, afterwards.
+    pub normals: Normals,
+    /// Every mesh gets the target by itself: the ratio is each one's own, not the scene's.
+    pub per_mesh: bool,
+    /// Materials whose faces stay: by name, or by number.
+    pub lock_materials: Vec<String>,
+    /// Groups whose faces stay: by the name of the group, or of the object.
+    pub lock_groups: Vec<String>,
+    /// The attribute that holds the vertices' weights (positive, 1 = normal).
+    pub weights_property: Option<String>,
+    /// The attribute that locks a vertex where it is not 0.
+    pub lock_property: Option<String>,
+}
+
+/// What came of it, over all meshes.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Summary {
+    /// Faces before, polygons count one.
+    pub faces_in: usize,
+    /// Faces after.
+    pub faces_out: usize,
+    /// Triangles before: a polygon of n corners counts n - 2.
+    pub triangles_in: usize,
+    /// Triangles after.
+    pub triangles_out: usize,
+    /// The number of triangles asked for, if one was.
+    pub target: Option<usize>,
+    /// Vertices after.
+    pub vertices_out: usize,
+    /// Why it ended.
+    pub stop: Stop,
+    /// The largest estimated error of all meshes, in world units. Not a bound.
+    pub estimate: f64,
+    /// The passes; those of equal number in several meshes are one.
+    pub levels: Vec<Level>,
+    /// Bytes of the AIF relations of all meshes, at the start.
+    pub aif_bytes: usize,
+    /// Diagonal of the scene's bounding box, world units.
+    pub diagonal: f64,
+    /// Seconds from arrays to meshes.
+    pub build_seconds: f64,
+    /// Seconds from meshes to simplified arrays, normals included.
+    pub simplify_seconds: f64,
+    /// What was changed that was not asked for, each said once.
+    pub warnings: Vec<String>,
+}
+
+impl Summary {
+    /// True if triangles were asked for, and more are left because nothing else may be collapsed (or the caller cancelled).
+    pub fn missed_target(&self) -> bool {
+        self.target.is_some_and(|t| self.triangles_out > t)
+            && matches!(self.stop, Stop::NoLegalCollapse | Stop::Cancelled)
+    }
+}
+
+/// Why nothing was simplified.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum JobError {
+    /// A mesh is no mesh. The input is wrong.
+    #[error("{mesh}{source}")]
+    Build {
+        /// Which mesh, with a colon; empty when there is one only.
+        mesh: String,
+        /// What is wrong with it.
+        source: BuildError,
+    },
+    /// An option is out of range.
+    #[error(transparent)]
+    Options(#[from] SimplifyError),
+    /// What should be locked, or give weights, is not there.
+    #[error("no {kind} `{name}`; {there}")]
+    NotFound {
+        /// `material`, `group` or `vertex property`.
+        kind: &'static str,
+        /// The name asked for.
+        name: String,
+        /// What there is instead.
+        there: String,
+    },
+    /// Weights or locks by vertex, for several meshes at once. Use `per_mesh`.
+    #[error("weights and locks by vertex need a file of one mesh; this one has {meshes} (or treat each by itself)")]
+    SeveralMeshes {
+        /// Their number.
+        meshes: usize,
+    },
+    /// A weight is not positive.
+    #[error("vertex {vertex}: weight {value}; weights must be positive")]
+    Weight {
+        /// The vertex, from 0, after welding.
+        vertex: usize,
+        /// Its weight.
+        value: f32,
+    },
+    /// Computed normals would be one attribute too many.
+    #[error("{0}")]
+    Channels(#[from] crate::aif::TooManyChannels),
+    /// The result breaks an invariant of the mesh: a fault of this program, not of the input.
+    #[error("{mesh}the result is no valid mesh: {source}; please report this")]
+    Broken {
+        /// Which mesh, with a colon; empty when there is one only.
+        mesh: String,
+        /// What is broken.
+        source: CheckError,
+    },
+}
+
+/// Simplifies all meshes of `scene`. Nodes, materials and images stay as they are; instances stay instances.
+///
+/// The target counts the triangles of the unique meshes and is shared by world-space error, unless `per_mesh` is set. A cancelled job returns
+/// what there is, with [`Stop::Cancelled`]. Never panics on any scene a decoder of this crate returns.
+pub fn simplify_scene(
+    mut scene: Scene,
+    job: &Job,
+    control: &dyn Control,
+) -> Result<(Scene, Summary), JobError> {
+    let mut options = job.options.clone();
+    let mut warnings = Vec::new();
+    let start = Instant::now();
+
+    options.locked_materials.extend(locks::materials(&scene, &job.lock_materials)?);
+    locks::make_groups_distinct(&mut scene);
+    options.locked_groups.extend(locks::groups(&scene, &job.lock_groups)?);
+    let diagonal = scale::world_diagonal(&scene);
+    let scales = world_scales(&scene);
+
+    let weld = weld_of(&scene, job.weld);
+    let mut meshes = Vec::with_capacity(scene.meshes.len());
+    for i in 0..scene.meshes.len() {
+        let label = label(&scene, i);
+        let input = std::mem::take(&mut scene.meshes[i].geometry);
+        let (mesh, report) = Mesh::build(input, &BuildOptions::with_weld(weld))
+            .map_err(|source| JobError::Build { mesh: label.clone(), source })?;
+        say_report(&label, &report, job.weld != Weld::No, &mut warnings);
+        meshes.push(mesh);
+    }
+    let triangles: Vec<usize> = meshes.iter().map(Mesh::triangle_count).collect();
+    let triangles_in: usize = triangles.iter().sum();
+    if triangles_in == 0 {
+        warnings.push("the input has no faces".into());
+    }
+    let build_seconds = start.elapsed().as_secs_f64();
+
+    let start = Instant::now();
+    let by_vertex = job.weights_property.is_some() || job.lock_property.is_some();
+    if by_vertex && meshes.len() > 1 && !job.per_mesh {
+        return Err(JobError::SeveralMeshes { meshes: meshes.len() });
+    }
+    let mut outcomes = Vec::with_capacity(meshes.len());
+    if job.per_mesh {
+        let mut done = 0;
+        for (i, mesh) in meshes.iter_mut().enumerate() {
+            let mut own = options.clone();
+            locks::by_vertex(mesh, job, &mut own)?;
+            let part = Part {
+                control,
+                start: done as f64 / triangles_in.max(1) as f64,
+                share: triangles[i] as f64 / triangles_in.max(1) as f64,
+            };
+            done += triangles[i];
+            let one = simplify::simplify_all(std::slice::from_mut(mesh), &scales[i..=i], &own, &part)?;
+            outcomes.extend(one);
+        }
+    } else {
+        if let [mesh] = meshes.as_mut_slice() {
+            locks::by_vertex(mesh, job, &mut options)?;
+        }
+        if let Some(e) = options.max_error.as_mut().filter(|e| e.relative && meshes.len() > 1) {
+            (e.value, e.relative) = (e.value * diagonal, false);
+        }
+        outcomes = simplify::simplify_all(&mut meshes, &scales, &options, control)?;
+    }
+    for (i, mesh) in meshes.into_iter().enumerate() {
+        if cfg!(debug_assertions) {
+            mesh.check().map_err(|source| JobError::Broken { mesh: label(&scene, i), source })?;
+        }
+        let mut geometry = mesh.to_input();
+        normals::apply(&mut geometry, job.normals)?;
+        scene.meshes[i].geometry = geometry;
+    }
+    locks::restore_groups(&mut scene);
+    let simplify_seconds = start.elapsed().as_secs_f64();
+
+    let triangulated: usize = outcomes.iter().map(|o| o.triangulated).sum();
+    if triangulated > 0 {
+        warnings.push(format!("{triangulated} polygons were cut into triangles, which this method needs"));
+    }
+    let isolated: usize = outcomes.iter().map(|o| o.isolated_removed).sum();
+    if isolated > 0 {
+        warnings.push(format!("{isolated} vertices without a face were left out"));
+    }
+    let target = target(&options, &triangles, job.per_mesh);
+    let triangles_out = outcomes.iter().map(|o| o.triangles_out).sum();
+    let summary = Summary {
+        faces_in: outcomes.iter().map(|o| o.faces_in).sum(),
+        faces_out: outcomes.iter().map(|o| o.faces_out).sum(),
+        triangles_in,
+        triangles_out,
+        target,
+        vertices_out: outcomes.iter().map(|o| o.vertices_out).sum(),
+        stop: common_stop(&outcomes, target.is_some_and(|t| triangles_out <= t)),
+        estimate: outcomes.iter().zip(&scales).map(|(o, s)| o.estimate * s).fold(0.0, f64::max),
+        levels: common_levels(&outcomes),
+        aif_bytes: outcomes.iter().map(|o| o.aif_bytes).sum(),
+        diagonal,
+        build_seconds,
+        simplify_seconds,
+        warnings,
+    };
+    Ok((scene, summary))
+}
+
+/// The rule of welding for this scene, when `asked` is what the caller wants.
+pub fn weld_of(scene: &Scene, asked: Weld) -> Weld {
+    if asked == Weld::No && scene.gltf.is_some() { Weld::BitEqual } else { asked }
+}
+
+/// How messages name mesh `i`: empty when there is but one, else its number and name, with a colon.
+pub fn label(scene: &Scene, i: usize) -> String {
+    match scene.meshes.get(i).map(|m| &m.name) {
+        _ if scene.meshes.len() <= 1 => String::new(),
+        Some(Some(name)) => format!("mesh {i} ({name}): "),
+        _ => format!("mesh {i}: "),
+    }
+}
+
+/// Says what building changed.
+fn say_report(label: &str, report: &BuildReport, welding: bool, warnings: &mut Vec<String>) {
+    let mut say = |faces: &[u32], what: &str| {
+        if let Some(first) = faces.first() {
+            warnings.push(format!("{label}{} {what} (the first: face {first})", count(faces.len(), "face")));
+        }
+    };
+    say(&report.dropped_faces, "with fewer than three distinct corners left out");
+    say(&report.shortened_faces, "with a corner repeated, now once");
+    say(&report.split_faces, "that visit a vertex twice, split there");
+    if report.dropped_wires > 0 {
+        warnings.push(format!("{label}{} of no length left out", count(report.dropped_wires, "line segment")));
+    }
+    if welding {
+        warnings.push(format!("{label}{} welded", count(report.welded_vertices, "vertex")));
+    }
+}
+
+/// `1 face`, `2 faces`.
+pub fn count(n: usize, what: &str) -> String {
+    match (n, what) {
+        (1, _) => format!("1 {what}"),
+        (_, "vertex") => format!("{n} vertices"),
+        _ => format!("{n} {what}s"),
+    }
+}
+
+/// The triangles asked for: of the scene, or of each mesh and added up.
+fn target(options: &Options, triangles: &[usize], per_mesh: bool) -> Option<usize> {
+    let of = |total: usize| {
+        let by_ratio = options.ratio.map(|r| (r * total as f64).round() as usize);
+        // The first of two targets that is reached ends the work: the larger.
+        options.triangles.into_iter().chain(by_ratio).max()
+    };
+    match per_mesh {
+        false => of(triangles.iter().sum()),
+        true => triangles.iter().map(|&t| of(t)).sum(),
+    }
+}
+
+/// One reason for all meshes: the one that kept the whole from going on.
+fn common_stop(outcomes: &[Outcome], target_met: bool) -> Stop {
+    let any = |s: Stop| outcomes.iter().any(|o| o.stop == s);
+    if any(Stop::Cancelled) {
+        Stop::Cancelled
+    } else if target_met || outcomes.iter().all(|o| o.stop == Stop::Target) {
+        Stop::Target
+    } else if any(Stop::Error) {
+        Stop::Error
+    } else if any(Stop::Passes) {
+        Stop::Passes
+    } else {
+        Stop::NoLegalCollapse
+    }
+}
+
+/// Level k of all meshes as one. A mesh that had fewer passes counts with the faces of its last.
+fn common_levels(outcomes: &[Outcome]) -> Vec<Level> {
+    let n = outcomes.iter().map(|o| o.levels.len()).max().unwrap_or(0);
+    let level = |k: usize| {
+        let mut sum = Level::default();
+        sum.pass = k + 1;
+        for o in outcomes {
+            let Some(l) = o.levels.get(k) else {
+                sum.faces += o.levels.last().map_or(o.faces_out, |l| l.faces);
+                continue;
+            };
+            sum.pass = l.pass;
+            sum.faces += l.faces;
+            sum.seconds += l.seconds;
+            sum.tried += l.tried;
+            let (a, b) = (sum.refused, l.refused);
+            sum.refused = Refused {
+                link: a.link + b.link,
+                normal: a.normal + b.normal,
+                border: a.border + b.border,
+                flip: a.flip + b.flip,
+                valence: a.valence + b.valence,
+                locked: a.locked + b.locked,
+            };
+        }
+        sum
+    };
+    (0..n).map(level).collect()
+}
+
+/// The part of the progress that belongs to one mesh.
+struct Part<'a> {
+    control: &'a dyn Control,
+    start: f64,
+    share: f64,
+}
+
+impl Control for Part<'_> {
+    fn progress(&self, done: f64) {
+        self.control.progress(self.start + done * self.share);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.control.cancelled()
+    }
+}
+
+/// What [`prepare`] does to meshes without simplifying them.
+#[derive(Clone, Copy, Debug, Default)]
+#[non_exhaustive]
+pub struct Preparation {
+    /// Which vertices become one.
+    pub weld: Weld,
+    /// Cut polygons into triangles.
+    pub triangulate: bool,
+    /// What becomes of the normals.
+    pub normals: Normals,
+}
+
+/// Checks all meshes and does what is asked for, nothing else: unless vertices are welded or polygons cut, even degenerate
+/// faces stay. Returns warnings.
+pub fn prepare(scene: &mut Scene, how: &Preparation) -> Result<Vec<String>, JobError> {
+    let mut warnings = Vec::new();
+    for i in 0..scene.meshes.len() {
+        let label = label(scene, i);
+        let SceneMesh { geometry, .. } = &mut scene.meshes[i];
+        let failed = |source| JobError::Build { mesh: label.clone(), source };
+        if how.weld == Weld::No && !how.triangulate {
+            geometry.validate().map_err(failed)?;
+        } else {
+            let input: MeshInput = std::mem::take(geometry);
+            let (mut mesh, report) = Mesh::build(input, &BuildOptions::with_weld(how.weld)).map_err(failed)?;
+            say_report(&label, &report, how.weld != Weld::No, &mut warnings);
+            if how.triangulate {
+                mesh = mesh.triangulated();
+            }
+            *geometry = mesh.to_input();
+        }
+        normals::apply(geometry, how.normals)?;
+    }
+    Ok(warnings)
+}
+
+#[cfg(test)]
+mod tests;
