@@ -7,4 +7,6 @@ pub use progmesh_simplify as simplify;
 
 pub mod io;
 pub mod normals;
+pub mod pipeline;
+pub mod samples;
 pub mod scene;

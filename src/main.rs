@@ -1,1 +1,7 @@
-fn main() {}
+//! The `progmesh` command.
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::main()
+}

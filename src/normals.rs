@@ -45,7 +45,10 @@ pub fn apply(input: &mut MeshInput, normals: Normals) -> Result<(), TooManyChann
 fn remove(input: &mut MeshInput) {
     let Some(w) = &mut input.wedges else { return };
     let goes = |s: &Semantic| {
-        matches!(s, Semantic::Normal | Semantic::Tangent | Semantic::MorphNormal(_) | Semantic::MorphTangent(_))
+        matches!(
+            s,
+            Semantic::Normal | Semantic::Tangent | Semantic::MorphNormal(_) | Semantic::MorphTangent(_)
+        )
     };
     while let Some(k) = w.channels().iter().position(|c| goes(&c.semantic)) {
         w.remove_channel(k);
@@ -133,9 +136,8 @@ fn corner_normals(input: &MeshInput, crease: f64) -> Vec<Vec3> {
         let n = range.len;
         let at = |i: usize| first + i % n;
         let origin = if n > 0 { point(first) } else { DVec3::ZERO };
-        let newell: DVec3 = (1..n.saturating_sub(1))
-            .map(|i| (point(at(i)) - origin).cross(point(at(i + 1)) - origin))
-            .sum();
+        let newell: DVec3 =
+            (1..n.saturating_sub(1)).map(|i| (point(at(i)) - origin).cross(point(at(i + 1)) - origin)).sum();
         face_normal.push(newell.try_normalize().unwrap_or(DVec3::ZERO));
         for i in 0..n {
             let (before, here, after) = (at(i + n - 1), at(i), at(i + 1));
@@ -259,7 +261,9 @@ mod tests {
     #[test]
     fn seams_stay_and_tangents_are_turned_square() {
         let mut m = cube();
-        let mut w = Wedges::new(vec![Channel::new(Semantic::TexCoord(0), 2), Channel::new(Semantic::Tangent, 4)]).unwrap();
+        let mut w =
+            Wedges::new(vec![Channel::new(Semantic::TexCoord(0), 2), Channel::new(Semantic::Tangent, 4)])
+                .unwrap();
         for i in 0..24 {
             w.push(&[i as f32, 0.0, 1.0, 1.0, 1.0, -1.0], 0b11);
         }

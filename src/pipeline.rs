@@ -106,7 +106,9 @@ pub enum JobError {
         there: String,
     },
     /// Weights or locks by vertex, for several meshes at once. Use `per_mesh`.
-    #[error("weights and locks by vertex need a file of one mesh; this one has {meshes} (or treat each by itself)")]
+    #[error(
+        "weights and locks by vertex need a file of one mesh; this one has {meshes} (or treat each by itself)"
+    )]
     SeveralMeshes {
         /// Their number.
         meshes: usize,
@@ -262,7 +264,8 @@ fn say_report(label: &str, report: &BuildReport, welding: bool, warnings: &mut V
     say(&report.shortened_faces, "with a corner repeated, now once");
     say(&report.split_faces, "that visit a vertex twice, split there");
     if report.dropped_wires > 0 {
-        warnings.push(format!("{label}{} of no length left out", count(report.dropped_wires, "line segment")));
+        warnings
+            .push(format!("{label}{} of no length left out", count(report.dropped_wires, "line segment")));
     }
     if welding {
         warnings.push(format!("{label}{} welded", count(report.welded_vertices, "vertex")));
@@ -378,10 +381,11 @@ pub fn prepare(scene: &mut Scene, how: &Preparation) -> Result<Vec<String>, JobE
             geometry.validate().map_err(failed)?;
         } else {
             let input: MeshInput = std::mem::take(geometry);
-            let (mut mesh, report) = Mesh::build(input, &BuildOptions::with_weld(how.weld)).map_err(failed)?;
+            let (mut mesh, report) =
+                Mesh::build(input, &BuildOptions::with_weld(how.weld)).map_err(failed)?;
             say_report(&label, &report, how.weld != Weld::No, &mut warnings);
             if how.triangulate {
-                mesh = mesh.triangulated();
+                mesh = mesh.triangulate().map_err(failed)?.mesh;
             }
             *geometry = mesh.to_input();
         }
@@ -389,6 +393,3 @@ pub fn prepare(scene: &mut Scene, how: &Preparation) -> Result<Vec<String>, JobE
     }
     Ok(warnings)
 }
-
-#[cfg(test)]
-mod tests;

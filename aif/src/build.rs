@@ -52,6 +52,11 @@ impl MeshInput {
         }
     }
 
+    /// Refuses what [`Mesh::build`] would refuse, naming the element; changes nothing. O(n).
+    pub fn validate(&self) -> Result<(), BuildError> {
+        validate(self)
+    }
+
     /// Number of faces.
     pub fn face_count(&self) -> usize {
         self.face_sizes.as_ref().map_or(self.corners.len() / 3, Vec::len)

@@ -4,7 +4,9 @@
 //! file in its own directory, then all are renamed, those beside the main file first, the main file last. What fails before the
 //! first rename changes nothing. No `fsync`: the guarantee is against errors and interrupts, not against power loss.
 
-use super::{DecodeError, Decoded, EncodeError, EncodeOptions, Encoded, Format, NoSide, Side, decode, encode};
+use super::{
+    DecodeError, Decoded, EncodeError, EncodeOptions, Encoded, Format, NoSide, Side, decode, encode,
+};
 use crate::scene::Scene;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Write};
@@ -79,7 +81,8 @@ impl WriteError {
 
 /// Reads a mesh file, by the name's extension if `format` is `None`. `-` is standard input, and needs a format.
 pub fn read(path: &Path, format: Option<Format>) -> Result<Loaded, ReadError> {
-    let format = format.or_else(|| Format::from_name(&path.to_string_lossy())).ok_or(ReadError::UnknownFormat)?;
+    let format =
+        format.or_else(|| Format::from_name(&path.to_string_lossy())).ok_or(ReadError::UnknownFormat)?;
     let bytes = read_bytes(path).map_err(ReadError::Io)?;
     let decoded = if is_dash(path) {
         decode(format, &bytes, &NoSide)?
@@ -178,7 +181,11 @@ fn relative_below(name: &str) -> Result<PathBuf, &'static str> {
             Component::Normal(p) => path.push(p),
             Component::CurDir => {}
             Component::ParentDir if path.pop() => {}
-            _ => return Err("`..` leads out of the input's directory; only files beside it and below are read"),
+            _ => {
+                return Err(
+                    "`..` leads out of the input's directory; only files beside it and below are read",
+                );
+            }
         }
     }
     if path.as_os_str().is_empty() { Err("it has no name") } else { Ok(path) }
@@ -233,7 +240,9 @@ pub fn write(
         out.write_all(&encoded.bytes).and_then(|()| out.flush()).map_err(at(Path::new("standard output")))?;
         return Ok(match names.is_empty() {
             true => vec![],
-            false => vec![format!("{} not written: standard output has room for one file only", names.join(", "))],
+            false => {
+                vec![format!("{} not written: standard output has room for one file only", names.join(", "))]
+            }
         });
     }
     let directory = directory_of(path);

@@ -64,8 +64,7 @@ pub(super) fn groups(scene: &Scene, wanted: &[String]) -> Result<Vec<u32>, JobEr
 pub(super) fn by_vertex(mesh: &Mesh, job: &Job, options: &mut Options) -> Result<(), JobError> {
     if let Some(name) = &job.weights_property {
         let values = vertex_values(mesh, name)?;
-        if let Some((vertex, &value)) =
-            values.iter().enumerate().find(|(_, w)| !w.is_nan() && !(w.is_finite() && **w > 0.0))
+        if let Some((vertex, &value)) = values.iter().enumerate().find(|(_, w)| **w <= 0.0 || w.is_infinite())
         {
             return Err(JobError::Weight { vertex, value });
         }

@@ -27,12 +27,13 @@ pub(super) fn world_diagonal(scene: &Scene) -> f64 {
     if shown.is_empty() {
         shown = (0..bounds.len()).map(|m| (m, DMat4::IDENTITY)).collect();
     }
-    let corners = shown.iter().filter_map(|&(m, w)| Some((bounds.get(m).copied()??, w))).flat_map(|((lo, hi), w)| {
-        (0..8u32).map(move |i| {
-            let pick = |k: u32, axis: usize| if i >> k & 1 == 1 { hi[axis] } else { lo[axis] };
-            w.transform_point3(DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2)))
-        })
-    });
+    let corners =
+        shown.iter().filter_map(|&(m, w)| Some((bounds.get(m).copied()??, w))).flat_map(|((lo, hi), w)| {
+            (0..8u32).map(move |i| {
+                let pick = |k: u32, axis: usize| if i >> k & 1 == 1 { hi[axis] } else { lo[axis] };
+                w.transform_point3(DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2)))
+            })
+        });
     crate::aif::positions::bounds(corners).map_or(0.0, |(lo, hi)| lo.distance(hi))
 }
 
@@ -49,7 +50,8 @@ fn stretch(m: &DMat4) -> f64 {
     let (x, y, z) = (s.x_axis, s.y_axis, s.z_axis);
     let mean = (x.x + y.y + z.z) / 3.0;
     let off = x.y * x.y + x.z * x.z + y.z * y.z;
-    let spread = (((x.x - mean).powi(2) + (y.y - mean).powi(2) + (z.z - mean).powi(2) + 2.0 * off) / 6.0).sqrt();
+    let spread =
+        (((x.x - mean).powi(2) + (y.y - mean).powi(2) + (z.z - mean).powi(2) + 2.0 * off) / 6.0).sqrt();
     if spread <= f64::EPSILON * mean {
         return largest * mean.sqrt();
     }

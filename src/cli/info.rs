@@ -1,0 +1,444 @@
+//! `progmesh info IN`.
+
+use super::common::{self, FormatName, Warnings, not_negative, short, thousands};
+use super::{Failure, common::name, problems};
+use progmesh::aif::attributes::{Encoding, Semantic};
+use progmesh::aif::{BuildOptions, BuildReport, Mesh, NONE};
+use progmesh::pipeline::{label, weld_of};
+use progmesh::scene::Scene;
+use serde::Serialize;
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Say what a mesh file holds: counts, kinds of vertices and edges, borders, components, genus, attributes, materials, problems.
+///
+/// Counts are of the unique meshes; an instance counts once. glTF meshes are looked at with vertices of equal positions as one.
+#[derive(clap::Args, Debug)]
+#[command(after_help = "\
+Examples:
+  progmesh info bunny.obj
+  progmesh info scene.glb --json
+  progmesh info scan.ply --check && echo valid
+  progmesh info part.stl --weld=0.001
+
+--check ends with exit code 1 if a mesh breaks an invariant, and names the first. A file that holds no mesh at all (an index \
+out of range, a coordinate that is not a number) is invalid input: exit code 3, with or without --check.")]
+pub(crate) struct Args {
+    /// The mesh to read; - for standard input, with --from
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// Format of IN, instead of what its name says
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    from: Option<FormatName>,
+    /// Look at the mesh with vertices at the same place, or within EPS model units, as one
+    #[arg(long, value_name = "EPS", num_args = 0..=1, require_equals = true, default_missing_value = "0",
+          value_parser = not_negative)]
+    weld: Option<f64>,
+    /// Verify every invariant; exit code 1 and the first broken one if there is any
+    #[arg(long)]
+    check: bool,
+    /// Print one JSON object (see docs/json.md)
+    #[arg(long)]
+    json: bool,
+    /// Say no warnings
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+impl Args {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let mut warnings = Warnings::new(self.quiet);
+        let loaded = common::read(&self.input, self.from, &mut warnings)?;
+        let file = name(&self.input, "standard input");
+        let mut scene = loaded.decoded.scene;
+        let options = BuildOptions::with_weld(weld_of(&scene, common::weld_rule(self.weld)));
+        let (mut meshes, mut broken) = (Vec::new(), None);
+        for i in 0..scene.meshes.len() {
+            let label = label(&scene, i);
+            let input = std::mem::take(&mut scene.meshes[i].geometry);
+            let (mesh, report) =
+                Mesh::build(input, &options).map_err(|e| Failure::Input(format!("{file}: {label}{e}")))?;
+            if self.check && broken.is_none() {
+                broken = first_broken(&mesh, &report).map(|b| format!("{label}{b}"));
+            }
+            meshes.push(MeshInfo::of(&scene, i, &mesh, &report));
+        }
+        let info = Info {
+            command: "info",
+            file: file.clone(),
+            format: loaded.format.extension(),
+            bytes: loaded.bytes,
+            nodes: scene.nodes.len(),
+            instances: scene.nodes.iter().filter(|n| n.mesh.is_some()).count(),
+            meshes,
+            materials: scene.materials.iter().map(|m| m.name.clone()).collect(),
+            images: images(&scene),
+            check: match (self.check, &broken) {
+                (false, _) => None,
+                (true, None) => Some("ok".into()),
+                (true, Some(b)) => Some(b.clone()),
+            },
+            warnings: warnings.all,
+        };
+        if self.json {
+            let text = serde_json::to_string_pretty(&info).map_err(|e| Failure::Output(e.to_string()))?;
+            common::print(&(text + "\n"))?;
+        } else {
+            common::print(&info.text())?;
+        }
+        match broken {
+            Some(b) => Err(Failure::Missed(format!("{file}: {b}"))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The first invariant that the file's mesh breaks: those that building mends first, then all of [`Mesh::check`].
+fn first_broken(mesh: &Mesh, report: &BuildReport) -> Option<String> {
+    let faces = problems::broken_faces(report).into_iter().next();
+    faces.or_else(|| mesh.check().err().map(|e| e.to_string()))
+}
+
+fn images(scene: &Scene) -> Vec<ImageInfo> {
+    let image = |i: &progmesh::scene::Image| ImageInfo {
+        name: i.name.clone().or_else(|| i.uri.clone()),
+        mime: i.mime.clone(),
+        bytes: i.data.as_ref().map(Vec::len),
+    };
+    scene.images.iter().map(image).collect()
+}
+
+/// The schema of `info --json`; docs/json.md says what each field means.
+#[derive(Serialize)]
+struct Info {
+    command: &'static str,
+    file: String,
+    format: &'static str,
+    bytes: usize,
+    nodes: usize,
+    instances: usize,
+    meshes: Vec<MeshInfo>,
+    materials: Vec<String>,
+    images: Vec<ImageInfo>,
+    check: Option<String>,
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct MeshInfo {
+    name: Option<String>,
+    vertices: usize,
+    edges: usize,
+    faces: usize,
+    triangles: usize,
+    face_sizes: FaceSizes,
+    vertex_kinds: VertexKinds,
+    edge_kinds: EdgeKinds,
+    border_loops: usize,
+    components: usize,
+    euler: i64,
+    genus: Option<usize>,
+    manifold: bool,
+    closed: bool,
+    orientable: bool,
+    bounds: Option<[[f64; 3]; 2]>,
+    diagonal: f64,
+    precision: &'static str,
+    attributes: Vec<AttributeInfo>,
+    materials: Vec<PartInfo>,
+    groups: Vec<PartInfo>,
+    aif_bytes: usize,
+    problems: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct FaceSizes {
+    triangles: usize,
+    quads: usize,
+    larger: usize,
+}
+
+#[derive(Serialize)]
+struct VertexKinds {
+    isolated: usize,
+    cut: usize,
+    dangling: usize,
+    complex: usize,
+    border: usize,
+    interior: usize,
+}
+
+#[derive(Serialize)]
+struct EdgeKinds {
+    isolated: usize,
+    dangling: usize,
+    border: usize,
+    regular: usize,
+    complex: usize,
+}
+
+#[derive(Serialize)]
+struct AttributeInfo {
+    name: String,
+    width: usize,
+    encoding: &'static str,
+}
+
+/// A material or a group, and how many faces have it.
+#[derive(Serialize)]
+struct PartInfo {
+    name: String,
+    faces: usize,
+}
+
+#[derive(Serialize)]
+struct ImageInfo {
+    name: Option<String>,
+    mime: Option<String>,
+    bytes: Option<usize>,
+}
+
+impl MeshInfo {
+    fn of(scene: &Scene, i: usize, mesh: &Mesh, report: &BuildReport) -> Self {
+        let source = &scene.meshes[i];
+        let t = mesh.topology();
+        let kinds = t.count_kinds();
+        let sizes = t.faces().map(|f| t.corner_range(f).len());
+        let mut face_sizes = FaceSizes { triangles: 0, quads: 0, larger: 0 };
+        for n in sizes {
+            match n {
+                3 => face_sizes.triangles += 1,
+                4 => face_sizes.quads += 1,
+                _ => face_sizes.larger += 1,
+            }
+        }
+        let bounds = mesh.bounds();
+        let attributes = mesh.wedges().map_or(&[][..], |w| w.channels()).iter();
+        MeshInfo {
+            name: source.name.clone(),
+            vertices: mesh.vertex_count(),
+            edges: t.edge_count(),
+            faces: mesh.face_count(),
+            triangles: mesh.triangle_count(),
+            face_sizes,
+            vertex_kinds: VertexKinds {
+                isolated: kinds.isolated_vertices,
+                cut: kinds.cut_vertices,
+                dangling: kinds.dangling_vertices,
+                complex: kinds.complex_vertices,
+                border: kinds.border_vertices,
+                interior: kinds.interior_vertices,
+            },
+            edge_kinds: EdgeKinds {
+                isolated: kinds.isolated_edges,
+                dangling: kinds.dangling_edges,
+                border: kinds.border_edges,
+                regular: kinds.regular_edges,
+                complex: kinds.complex_edges,
+            },
+            border_loops: t.border_loops().len(),
+            components: t.face_components().count,
+            euler: t.euler_characteristic(),
+            genus: t.genus(),
+            manifold: kinds.is_manifold(),
+            closed: kinds.is_closed(),
+            orientable: t.is_orientable(),
+            bounds: bounds.map(|(low, high)| [low.to_array(), high.to_array()]),
+            diagonal: bounds.map_or(0.0, |(low, high)| low.distance(high)),
+            precision: if mesh.positions().is_f64() { "f64" } else { "f32" },
+            attributes: attributes
+                .map(|c| AttributeInfo {
+                    name: attribute_name(&c.semantic),
+                    width: c.width,
+                    encoding: encoding_name(c.encoding),
+                })
+                .collect(),
+            materials: parts(mesh.face_materials(), |m| match scene.materials.get(m as usize) {
+                Some(material) if !material.name.is_empty() => material.name.clone(),
+                _ => format!("material {m}"),
+            }),
+            groups: parts(mesh.face_groups(), |g| {
+                source.groups.get(g as usize).map_or_else(|| format!("group {g}"), |g| g.label())
+            }),
+            aif_bytes: t.relation_bytes(),
+            problems: problems::find(mesh, &kinds, report),
+        }
+    }
+}
+
+/// How many faces have each material (or group), those of none left out; in the order of their numbers.
+fn parts(of_face: &[u32], label: impl Fn(u32) -> String) -> Vec<PartInfo> {
+    let mut counts = std::collections::BTreeMap::new();
+    for &m in of_face.iter().filter(|&&m| m != NONE) {
+        *counts.entry(m).or_insert(0usize) += 1;
+    }
+    counts.into_iter().map(|(m, faces)| PartInfo { name: label(m), faces }).collect()
+}
+
+fn attribute_name(s: &Semantic) -> String {
+    match s {
+        Semantic::Normal => "normal".into(),
+        Semantic::Tangent => "tangent".into(),
+        Semantic::TexCoord(k) => format!("uv {k}"),
+        Semantic::Color(k) => format!("colour {k}"),
+        Semantic::Joints(k) => format!("joints {k}"),
+        Semantic::Weights(k) => format!("weights {k}"),
+        Semantic::MorphPosition(k) => format!("morph target {k} position"),
+        Semantic::MorphNormal(k) => format!("morph target {k} normal"),
+        Semantic::MorphTangent(k) => format!("morph target {k} tangent"),
+        Semantic::Custom(name) => name.clone(),
+    }
+}
+
+fn encoding_name(e: Encoding) -> &'static str {
+    match e {
+        Encoding::F32 => "f32",
+        Encoding::F64 => "f64",
+        Encoding::U8 => "u8",
+        Encoding::U8Norm => "u8 normalized",
+        Encoding::I8 => "i8",
+        Encoding::I8Norm => "i8 normalized",
+        Encoding::U16 => "u16",
+        Encoding::U16Norm => "u16 normalized",
+        Encoding::I16 => "i16",
+        Encoding::I16Norm => "i16 normalized",
+        Encoding::U32 => "u32",
+        Encoding::I32 => "i32",
+    }
+}
+
+impl Info {
+    /// For people.
+    fn text(&self) -> String {
+        // Writing to a String cannot fail.
+        let mut s = String::new();
+        let _ = writeln!(s, "{}: {}, {} bytes", self.file, self.format, thousands(self.bytes));
+        if self.nodes > 1 || self.meshes.len() != 1 {
+            let triangles = self.meshes.iter().map(|m| m.triangles).sum();
+            let _ = writeln!(
+                s,
+                "{} meshes of {} triangles together; {} nodes, {} of them show a mesh",
+                self.meshes.len(),
+                thousands(triangles),
+                self.nodes,
+                self.instances
+            );
+        }
+        for (i, m) in self.meshes.iter().enumerate() {
+            let _ = match &m.name {
+                Some(n) => writeln!(s, "\nmesh {i}: {n}"),
+                None => writeln!(s, "\nmesh {i}"),
+            };
+            m.write(&mut s);
+            let materials: Vec<String> = m.materials.iter().map(|p| self.material_text(p)).collect();
+            if !materials.is_empty() {
+                let _ = writeln!(s, "  materials    {}", some_of(materials));
+            }
+        }
+        if !self.materials.is_empty() {
+            let _ = writeln!(s, "\nmaterials: {}", some_of(self.materials.clone()));
+        }
+        for i in &self.images {
+            let bytes = i.bytes.map_or("not found".into(), |b| format!("{} bytes", thousands(b)));
+            let _ = writeln!(s, "image: {}, {bytes}", i.name.as_deref().unwrap_or("(no name)"));
+        }
+        if let Some(check) = &self.check {
+            let _ = writeln!(s, "\ncheck: {check}");
+        }
+        s
+    }
+
+    fn material_text(&self, p: &PartInfo) -> String {
+        format!("{} ({} faces)", p.name, thousands(p.faces))
+    }
+}
+
+impl MeshInfo {
+    fn write(&self, s: &mut String) {
+        let n = thousands;
+        let _ = writeln!(s, "  vertices     {}{}", n(self.vertices), self.vertex_kinds.text());
+        let _ = writeln!(s, "  edges        {}{}", n(self.edges), self.edge_kinds.text());
+        let f = &self.face_sizes;
+        let sizes = [(f.triangles, "triangles"), (f.quads, "quads"), (f.larger, "larger")];
+        let _ = writeln!(s, "  faces        {}{}", n(self.faces), listed(&sizes));
+        let form = match (self.manifold, self.closed, self.orientable) {
+            (true, true, true) => "closed surface",
+            (true, true, false) => "closed surface, one-sided",
+            (true, false, true) => "surface with border",
+            (true, false, false) => "surface with border, one-sided",
+            (false, ..) => "non-manifold",
+        };
+        let genus = self.genus.map_or(String::new(), |g| format!(", genus {g}"));
+        let _ = writeln!(
+            s,
+            "  form         {form}; components {}, border loops {}, Euler characteristic {}{genus}",
+            n(self.components),
+            n(self.border_loops),
+            self.euler
+        );
+        if let Some([low, high]) = self.bounds {
+            let point = |p: [f64; 3]| p.map(short).join(" ");
+            let _ = writeln!(
+                s,
+                "  bounds       {} to {}, diagonal {}, {}",
+                point(low),
+                point(high),
+                short(self.diagonal),
+                self.precision
+            );
+        }
+        if !self.attributes.is_empty() {
+            let names = self.attributes.iter().map(|a| format!("{} ({} x {})", a.name, a.width, a.encoding));
+            let _ = writeln!(s, "  attributes   {}", some_of(names.collect()));
+        }
+        if !self.groups.is_empty() {
+            let names = self.groups.iter().map(|g| format!("{} ({} faces)", g.name, n(g.faces)));
+            let _ = writeln!(s, "  groups       {}", some_of(names.collect()));
+        }
+        let _ = writeln!(s, "  AIF          {} bytes", n(self.aif_bytes));
+        for p in &self.problems {
+            let _ = writeln!(s, "  problem      {p}");
+        }
+    }
+}
+
+impl VertexKinds {
+    fn text(&self) -> String {
+        listed(&[
+            (self.interior, "interior"),
+            (self.border, "border"),
+            (self.complex, "complex"),
+            (self.dangling, "dangling"),
+            (self.cut, "cut"),
+            (self.isolated, "isolated"),
+        ])
+    }
+}
+
+impl EdgeKinds {
+    fn text(&self) -> String {
+        listed(&[
+            (self.regular, "regular"),
+            (self.border, "border"),
+            (self.complex, "complex"),
+            (self.dangling, "dangling"),
+            (self.isolated, "isolated"),
+        ])
+    }
+}
+
+/// `: 3 of this, 4 of that`, those of none left out.
+fn listed(counts: &[(usize, &str)]) -> String {
+    let parts: Vec<String> =
+        counts.iter().filter(|c| c.0 > 0).map(|c| format!("{} {}", thousands(c.0), c.1)).collect();
+    if parts.is_empty() { String::new() } else { format!(": {}", parts.join(", ")) }
+}
+
+/// The first dozen, and how many more there are.
+fn some_of(mut names: Vec<String>) -> String {
+    const SHOWN: usize = 12;
+    let more = names.len().saturating_sub(SHOWN);
+    names.truncate(SHOWN);
+    let shown = names.join(", ");
+    if more == 0 { shown } else { format!("{shown}, and {more} more") }
+}

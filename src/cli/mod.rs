@@ -1,0 +1,102 @@
+//! The command line: one definition of the flags (for parsing, help, completions and man pages), one file a subcommand.
+//!
+//! Messages go to standard error and name the file; standard output is for what was asked for. Exit codes: 0 done, 1 done but the
+//! target was missed (or a check failed), 2 usage, 3 input unreadable or invalid, 4 output failed, 130 interrupted.
+
+mod common;
+mod completions;
+mod control;
+mod convert;
+mod generate;
+mod info;
+mod man;
+mod problems;
+mod simplify;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Simplify, inspect, convert and generate polygon meshes: OBJ, glTF, PLY, STL, OFF.
+#[derive(Parser)]
+#[command(name = "progmesh", version, max_term_width = 100, after_help = EXIT_CODES, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes: 0 done; 1 done, but the target was missed or a check failed; 2 wrong usage; 3 input unreadable or invalid; \
+4 output failed; 130 interrupted.";
+
+#[derive(Subcommand)]
+enum Command {
+    Simplify(Box<simplify::Args>),
+    Info(info::Args),
+    Convert(convert::Args),
+    Generate(generate::Args),
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+/// Why a command does not end with 0. The text is for people, with the file's name where it is about one.
+#[derive(Debug)]
+enum Failure {
+    /// Done, but not all that was asked for.
+    Missed(String),
+    Usage(String),
+    Input(String),
+    Output(String),
+    Interrupted,
+    /// Whoever read our output has gone away: no failure.
+    BrokenPipe,
+}
+
+impl Failure {
+    fn code(&self) -> u8 {
+        match self {
+            Failure::BrokenPipe => 0,
+            Failure::Missed(_) => 1,
+            Failure::Usage(_) => 2,
+            Failure::Input(_) => 3,
+            Failure::Output(_) => 4,
+            Failure::Interrupted => 130,
+        }
+    }
+
+    fn message(&self) -> Option<&str> {
+        match self {
+            Failure::Missed(m) | Failure::Usage(m) | Failure::Input(m) | Failure::Output(m) => Some(m),
+            Failure::Interrupted => Some("interrupted; nothing was written"),
+            Failure::BrokenPipe => None,
+        }
+    }
+}
+
+/// Runs the command that the process was started with.
+pub(crate) fn main() -> ExitCode {
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command,
+        Err(e) => {
+            // Help and version too; a reader that has gone away is no fault.
+            let _ = e.print();
+            return ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2));
+        }
+    };
+    let result = match command {
+        Command::Simplify(args) => args.run(),
+        Command::Info(args) => args.run(),
+        Command::Convert(args) => args.run(),
+        Command::Generate(args) => args.run(),
+        Command::Completions(args) => args.run(),
+        Command::Man(args) => args.run(),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            if let Some(message) = failure.message() {
+                common::print_error(message);
+            }
+            ExitCode::from(failure.code())
+        }
+    }
+}

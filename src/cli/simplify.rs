@@ -1,0 +1,419 @@
+//! `progmesh simplify IN OUT`.
+
+use super::common::{self, FormatName, Shape, Warnings, short, thousands};
+use super::control::{Interrupt, Progress};
+use super::{Failure, common::name};
+use clap::ValueEnum;
+use progmesh::io::files;
+use progmesh::pipeline::{Job, JobError, Summary, simplify_scene};
+use progmesh::simplify::{self as engine, MaxError, SimplifyError, Stop};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Reduce the number of faces of a mesh, or of a whole scene.
+///
+/// A scene's target counts the triangles of its unique meshes and is shared over them by the error it makes in the world. Materials, names, nodes,
+/// instances and images stay; attributes are interpolated; uv seams and material borders are not torn.
+#[derive(clap::Args, Debug)]
+#[command(after_help = "\
+Examples:
+  progmesh simplify bunny.obj half.obj --ratio 0.5
+  progmesh simplify scene.glb small.glb --triangles 10000
+  progmesh simplify scan.ply scan.stl --max-error 0.001 --relative
+  progmesh simplify horse.ply out.ply --method nsa --epsilon 12 --passes 5
+  progmesh simplify map.obj out.obj --ratio 0.1 --lock-border --lock-material water
+  progmesh simplify - - --from ply --to ply --ratio 0.2 < in.ply > out.ply
+
+Exit code 1 means: done and written, but the target could not be met; the message says why.")]
+pub(crate) struct Args {
+    /// The mesh to read; - for standard input, with --from
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    /// The file to write; - for standard output, with --to
+    #[arg(value_name = "OUT")]
+    output: PathBuf,
+    /// Format of IN, instead of what its name says
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    from: Option<FormatName>,
+    /// Format of OUT, instead of what its name says
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    to: Option<FormatName>,
+
+    /// How to simplify
+    #[arg(long, value_enum, default_value_t = MethodName::Quadric, help_heading = "Method")]
+    method: MethodName,
+    /// Where a vertex goes that replaces an edge (or a cluster) [default: midpoint for nsa, optimal otherwise]
+    #[arg(long, value_enum, help_heading = "Method")]
+    placement: Option<PlacementName>,
+    /// quadric: always the cheapest edge, or batches of cheap ones [default: bulk]
+    #[arg(long, value_enum, help_heading = "Method")]
+    schedule: Option<ScheduleName>,
+    /// nsa: the most a face's normal may turn in one collapse, degrees [default: 12]
+    #[arg(long, value_name = "DEG", value_parser = common::degrees, allow_negative_numbers = true,
+          help_heading = "Method")]
+    epsilon: Option<f64>,
+    /// nsa: at most this many passes
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Method")]
+    passes: Option<u32>,
+
+    /// Stop at this part of the input's triangles, 0 to 1
+    #[arg(long, value_name = "R", value_parser = common::fraction, conflicts_with = "triangles",
+          allow_negative_numbers = true, help_heading = "Target")]
+    ratio: Option<f64>,
+    /// Stop at this many triangles (a polygon of n corners counts n - 2)
+    #[arg(long, value_name = "N", help_heading = "Target")]
+    triangles: Option<usize>,
+    /// Stop before the estimated error passes this, in world units (an estimate, not a bound)
+    #[arg(long, value_name = "E", value_parser = common::not_negative, allow_negative_numbers = true,
+          help_heading = "Target")]
+    max_error: Option<f64>,
+    /// --max-error is a part of the bounding box's diagonal
+    #[arg(long, requires = "max_error", help_heading = "Target")]
+    relative: bool,
+    /// Each mesh of a scene gets the ratio (or the error) by itself, instead of a shared target
+    #[arg(long, conflicts_with = "triangles", help_heading = "Target")]
+    per_mesh: bool,
+
+    /// Vertices on a border neither move nor go
+    #[arg(long, help_heading = "What stays")]
+    lock_border: bool,
+    /// Faces of this material stay; may be repeated
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "What stays")]
+    lock_material: Vec<String>,
+    /// Faces of this group or object stay; may be repeated
+    #[arg(long, value_name = "NAME", help_heading = "What stays")]
+    lock_group: Vec<String>,
+    /// Vertices where this vertex property is not 0 stay
+    #[arg(long, value_name = "NAME", help_heading = "What stays")]
+    lock_property: Option<String>,
+    /// This vertex property says how much errors weigh there (positive, 1 = normal)
+    #[arg(long, value_name = "NAME", help_heading = "What stays")]
+    weights_property: Option<String>,
+    /// Index-only: no vertex moves and all are kept, so that several levels can share one vertex buffer
+    #[arg(long, help_heading = "What stays")]
+    keep_vertices: bool,
+    /// Once nothing else is legal, remove components smaller than this part of the mesh's diagonal
+    #[arg(long, value_name = "FRACTION", value_parser = common::fraction, allow_negative_numbers = true,
+          help_heading = "What stays")]
+    prune: Option<f64>,
+
+    #[command(flatten)]
+    shape: Shape,
+    /// Write text where the format has text and binary (PLY, STL)
+    #[arg(long)]
+    text: bool,
+    /// Threads to use; the result does not depend on it [default: all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Print one JSON object about the run on standard output (see docs/json.md)
+    #[arg(long)]
+    json: bool,
+    /// Say nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    /// Edge collapse while no face's normal turns by more than --epsilon (Silva & Gomes)
+    Nsa,
+    /// Quadric edge collapse (Garland & Heckbert)
+    Quadric,
+    /// Vertex clustering on a grid: fastest, coarsest, does not keep topology
+    Cluster,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum PlacementName {
+    Endpoint,
+    Midpoint,
+    Optimal,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ScheduleName {
+    Exact,
+    Bulk,
+}
+
+impl Args {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let start = Instant::now();
+        let job = self.job()?;
+        let format = common::output_format(&self.output, self.to)?;
+        if self.json && files::is_dash(&self.output) {
+            return Err(Failure::Usage(
+                "--json and OUT both want standard output; write OUT to a path".into(),
+            ));
+        }
+        let interrupt = Interrupt::watch();
+        let mut warnings = Warnings::new(self.quiet);
+        let threads = self.threads.map(usize::from);
+        let file = name(&self.input, "standard input");
+
+        // All within one pool, so that reading and writing keep to the number of threads too.
+        let (summary, seconds, written) = common::in_pool(threads, || {
+            let loaded = common::read(&self.input, self.from, &mut warnings)?;
+            let read = start.elapsed().as_secs_f64();
+            interrupt.be_graceful();
+            let result = simplify_scene(loaded.decoded.scene, &job, &Progress::new(&interrupt, self.quiet));
+            let (scene, summary) = result.map_err(|e| failure(&file, e))?;
+            warnings.say(summary.warnings.iter().map(|w| format!("{file}: {w}")));
+            let writing = Instant::now();
+            let written = match summary.stop {
+                Stop::Cancelled => Err(Failure::Interrupted),
+                _ => common::write(&self.output, format, self.text, &scene, &interrupt, &mut warnings),
+            };
+            let seconds = Seconds {
+                read,
+                build: summary.build_seconds,
+                simplify: summary.simplify_seconds,
+                write: writing.elapsed().as_secs_f64(),
+                total: start.elapsed().as_secs_f64(),
+            };
+            Ok((summary, seconds, written))
+        })?;
+        if let Err(e @ (Failure::Output(_) | Failure::BrokenPipe)) = written {
+            return Err(e);
+        }
+        if !self.quiet && written.is_ok() {
+            self.tell(&file, &summary, &seconds);
+        }
+        if self.json {
+            common::print(&self.report(&summary, seconds, warnings.all)?)?;
+        }
+        written?;
+        match summary.target {
+            Some(target) if summary.missed_target() => Err(Failure::Missed(format!(
+                "{file}: {} triangles are left of the {} asked for: no further collapse is legal. {}",
+                thousands(summary.triangles_out),
+                thousands(target),
+                self.advice(&summary)
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    fn job(&self) -> Result<Job, Failure> {
+        let only =
+            |flag: &str, given: bool, method: MethodName, of: &str| match given && self.method != method {
+                true => Err(Failure::Usage(format!("{flag} is for --method {of}"))),
+                false => Ok(()),
+            };
+        only("--epsilon", self.epsilon.is_some(), MethodName::Nsa, "nsa")?;
+        only("--passes", self.passes.is_some(), MethodName::Nsa, "nsa")?;
+        only("--schedule", self.schedule.is_some(), MethodName::Quadric, "quadric")?;
+        let target = self.ratio.is_some() || self.triangles.is_some() || self.max_error.is_some();
+        if !target && self.method != MethodName::Nsa {
+            return Err(Failure::Usage("how far? Give --ratio R, --triangles N or --max-error E".into()));
+        }
+        if self.keep_vertices && self.placement.is_some_and(|p| p != PlacementName::Endpoint) {
+            return Err(Failure::Usage(
+                "--keep-vertices moves no vertex: --placement can only be endpoint".into(),
+            ));
+        }
+        let mut job = Job::default();
+        let o = &mut job.options;
+        o.method = match self.method {
+            MethodName::Nsa => engine::Method::Nsa,
+            MethodName::Quadric => engine::Method::Quadric,
+            MethodName::Cluster => engine::Method::Cluster,
+        };
+        o.placement = self.placement.map(|p| match p {
+            PlacementName::Endpoint => engine::Placement::Endpoint,
+            PlacementName::Midpoint => engine::Placement::Midpoint,
+            PlacementName::Optimal => engine::Placement::Optimal,
+        });
+        o.schedule = self.schedule.map(|s| match s {
+            ScheduleName::Exact => engine::Schedule::Exact,
+            ScheduleName::Bulk => engine::Schedule::Bulk,
+        });
+        o.triangles = self.triangles;
+        o.ratio = self.ratio;
+        o.max_error = self.max_error.map(|value| MaxError { value, relative: self.relative });
+        o.epsilon = self.epsilon;
+        o.passes = self.passes.map(|k| k as usize);
+        o.lock_border = self.lock_border;
+        o.keep_vertices = self.keep_vertices;
+        o.prune = self.prune;
+        o.threads = self.threads.map(usize::from);
+        job.weld = self.shape.weld();
+        job.normals = self.shape.normals()?;
+        job.per_mesh = self.per_mesh;
+        job.lock_materials = self.lock_material.clone();
+        job.lock_groups = self.lock_group.clone();
+        job.weights_property = self.weights_property.clone();
+        job.lock_property = self.lock_property.clone();
+        Ok(job)
+    }
+
+    /// The summary for people, on standard error.
+    fn tell(&self, file: &str, s: &Summary, t: &Seconds) {
+        if self.method == MethodName::Nsa {
+            for l in &s.levels {
+                common::note(&format!(
+                    "pass {}: {} faces, {:.3} s, {} collapses tried, {} refused",
+                    l.pass,
+                    thousands(l.faces),
+                    l.seconds,
+                    thousands(l.tried as usize),
+                    thousands(l.refused.total() as usize)
+                ));
+            }
+        }
+        let percent = 100.0 * s.faces_out as f64 / s.faces_in.max(1) as f64;
+        let relative = match s.diagonal > 0.0 {
+            true => format!(" ({} % of the diagonal)", short(100.0 * s.estimate / s.diagonal)),
+            false => String::new(),
+        };
+        common::note(&format!(
+            "{file}: {} -> {} faces ({percent:.1} %), {} vertices; {}, {:.3} s (read {:.3}, build {:.3}, simplify {:.3}, \
+             write {:.3}); estimated error {}{relative}; stopped: {}",
+            thousands(s.faces_in),
+            thousands(s.faces_out),
+            thousands(s.vertices_out),
+            self.method_name(),
+            t.total,
+            t.read,
+            t.build,
+            t.simplify,
+            t.write,
+            short(s.estimate),
+            match s.stop {
+                Stop::Target => "target reached",
+                Stop::Error => "error bound reached",
+                Stop::Passes => "passes done",
+                Stop::Cancelled => "interrupted",
+                _ => "no legal collapse left",
+            }
+        ));
+    }
+
+    fn method_name(&self) -> &'static str {
+        match self.method {
+            MethodName::Nsa => "nsa",
+            MethodName::Quadric => "quadric",
+            MethodName::Cluster => "cluster",
+        }
+    }
+
+    /// What most likely stands in the way of the target, and what helps.
+    fn advice(&self, s: &Summary) -> String {
+        let last = s.levels.last().map(|l| l.refused).unwrap_or_default();
+        let reasons = [
+            (last.normal, "normals would turn too far: try a larger --epsilon"),
+            (
+                last.link,
+                "topology would change: try --weld or --prune, or --method cluster, which does not keep it",
+            ),
+            (last.border, "borders, seams or material borders would change: try --weld, or --method quadric"),
+            (last.flip, "faces would flip or degenerate: try --placement endpoint or another --method"),
+            (last.valence, "vertices would get too many edges: try --method cluster"),
+            (last.locked, "vertices are locked: lock less"),
+        ];
+        match reasons.iter().max_by_key(|r| r.0).filter(|r| r.0 > 0) {
+            Some((_, advice)) => format!("Mostly {advice}"),
+            None => "Try --weld, --prune or --method cluster".into(),
+        }
+    }
+
+    fn report(&self, s: &Summary, seconds: Seconds, warnings: Vec<String>) -> Result<String, Failure> {
+        let report = Report {
+            command: "simplify",
+            method: self.method_name(),
+            faces_in: s.faces_in,
+            faces_out: s.faces_out,
+            vertices_out: s.vertices_out,
+            seconds,
+            stop: match s.stop {
+                Stop::Target => "target",
+                Stop::Error => "error",
+                Stop::Passes => "passes",
+                Stop::Cancelled => "cancelled",
+                _ => "no_legal_collapse",
+            },
+            estimate: s.estimate,
+            measured: None,
+            levels: s
+                .levels
+                .iter()
+                .map(|l| LevelReport {
+                    pass: l.pass,
+                    faces: l.faces,
+                    seconds: l.seconds,
+                    tried: l.tried,
+                    refused: RefusedReport {
+                        link: l.refused.link,
+                        normal: l.refused.normal,
+                        border: l.refused.border,
+                        flip: l.refused.flip,
+                        valence: l.refused.valence,
+                        locked: l.refused.locked,
+                    },
+                })
+                .collect(),
+            aif_bytes: s.aif_bytes,
+            peak_bytes: files::peak_bytes(),
+            warnings,
+        };
+        let text = serde_json::to_string_pretty(&report).map_err(|e| Failure::Output(e.to_string()))?;
+        Ok(text + "\n")
+    }
+}
+
+/// An option that is wrong is a matter of usage, a mesh that is wrong one of input.
+fn failure(file: &str, e: JobError) -> Failure {
+    match e {
+        JobError::Options(SimplifyError::Range { .. })
+        | JobError::NotFound { .. }
+        | JobError::SeveralMeshes { .. } => Failure::Usage(format!("{file}: {e}")),
+        e => Failure::Input(format!("{file}: {e}")),
+    }
+}
+
+/// The schema of `--json`; docs/json.md says what each field means.
+#[derive(Serialize)]
+struct Report {
+    command: &'static str,
+    method: &'static str,
+    faces_in: usize,
+    faces_out: usize,
+    vertices_out: usize,
+    seconds: Seconds,
+    stop: &'static str,
+    estimate: f64,
+    measured: Option<()>,
+    levels: Vec<LevelReport>,
+    aif_bytes: usize,
+    peak_bytes: Option<u64>,
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Seconds {
+    read: f64,
+    build: f64,
+    simplify: f64,
+    write: f64,
+    total: f64,
+}
+
+#[derive(Serialize)]
+struct LevelReport {
+    pass: usize,
+    faces: usize,
+    seconds: f64,
+    tried: u64,
+    refused: RefusedReport,
+}
+
+#[derive(Serialize)]
+struct RefusedReport {
+    link: u64,
+    normal: u64,
+    border: u64,
+    flip: u64,
+    valence: u64,
+    locked: u64,
+}
