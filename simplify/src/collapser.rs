@@ -3,20 +3,26 @@
 
 use crate::options::{Options, Placement, Refused};
 use crate::quadric::Quadric;
-use crate::validity::{MAX_VALENCE, faces_stay_good};
+use crate::validity::{MAX_VALENCE, RingFace, gather_ring};
 use crate::wedges::WedgeMerge;
 use crate::work::{Kind, Roles, Work};
 use glam::DVec3;
 use progmesh_aif::{EdgeId, VertexId};
 
-/// Weight of the plane that stands on a border edge, times the edge's squared length.
-const BORDER_WEIGHT: f64 = 10.0;
+/// Weight of the plane that stands on a border edge, times the edge's squared length. Decided on rangemap, bunny and dragon at 1 %:
+/// at 100 borders starve the surface (rangemap rms + 80 %), at 0.1 they drift.
+const BORDER_WEIGHT: f64 = 3.0;
 /// Weight of the planes that stand on a seam edge.
 const SEAM_WEIGHT: f64 = 1.0;
-/// Pull towards the middle of the edge, relative to the mean eigenvalue of A: decides where A does not.
-const PULL: f64 = 1e-3;
+/// Pull towards the middle of the edge, relative to the mean eigenvalue of A: decides where A does not. At 1e-3 fandisk's sharp edges lose
+/// 20 % rms, from 1e-9 down nothing changes.
+const PULL: f64 = 1e-9;
 /// A vertex may be placed at most this many edge lengths from the middle of its edge.
 const REACH: f64 = 2.0;
+/// Pull of the volume correction: larger spreads it along the surface's normal. Decided on fandisk, bunny and horse.
+const VOLUME_PULL: f64 = 1e-2;
+/// The volume correction may move a vertex by at most this many edge lengths; at 1 the largest error of bunny at 1 % grows by 70 %.
+const VOLUME_REACH: f64 = 0.3;
 
 /// Where an edge would go, and at what cost.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +45,16 @@ pub(crate) struct Collapser<'m> {
     pub(crate) tried: u64,
     pub(crate) refused: Refused,
     wedges: WedgeMerge,
+    /// Scratch: the faces around a candidate.
+    ring: Vec<RingFace>,
+}
+
+/// Why a candidate is refused.
+enum Refusal {
+    Link,
+    Border,
+    Flip,
+    Valence,
 }
 
 impl<'m> Collapser<'m> {
@@ -60,6 +76,7 @@ impl<'m> Collapser<'m> {
             tried: 0,
             refused: Refused::default(),
             wedges,
+            ring: Vec::new(),
         }
     }
 
@@ -104,46 +121,72 @@ impl<'m> Collapser<'m> {
     /// Collapses the candidate if topology and geometry allow it. O(valence).
     pub(crate) fn attempt(&mut self, e: EdgeId, c: &Candidate) -> bool {
         self.tried += 1;
-        let Roles { kept, removed, .. } = c.roles;
-        let work = &mut self.work;
-        let t = work.mesh.topology();
-        if t.star(kept).len() + t.star(removed).len() > MAX_VALENCE + 4
-            && t.star(kept).len() + t.star(removed).len() > 4 + t.star(kept).len().max(t.star(removed).len())
-        {
-            self.refused.valence += 1;
-            return false;
+        let refusal = match self.check(e, c) {
+            Ok(to) => {
+                self.collapse(e, c, to);
+                return true;
+            }
+            Err(refusal) => refusal,
+        };
+        match refusal {
+            Refusal::Link => self.refused.link += 1,
+            Refusal::Border => self.refused.border += 1,
+            Refusal::Flip => self.refused.flip += 1,
+            Refusal::Valence => self.refused.valence += 1,
         }
-        if work.pinches_seam(e) {
-            self.refused.border += 1;
-            return false;
-        }
-        if t.link_condition_of_regular(e, kept, &mut work.marks).is_err() {
-            self.refused.link += 1;
-            return false;
-        }
-        let gone = t.edge_faces(e);
-        let kept_stays = c.to == work.points[kept.index()];
-        if !faces_stay_good(t, &work.points, removed, c.to, gone)
-            || !(kept_stays || faces_stay_good(t, &work.points, kept, c.to, gone))
-        {
-            self.refused.flip += 1;
-            return false;
-        }
-        self.collapse(e, c);
-        true
+        false
     }
 
-    fn collapse(&mut self, e: EdgeId, c: &Candidate) {
+    /// Where the kept vertex goes if the collapse is allowed.
+    fn check(&mut self, e: EdgeId, c: &Candidate) -> Result<DVec3, Refusal> {
+        let Roles { kept, removed, fixed } = c.roles;
+        let work = &mut self.work;
+        let t = work.mesh.topology();
+        // Two edges fall together with two others, and the collapsed one goes: a hub may shrink, not grow.
+        let (vk, vr) = (t.star(kept).len(), t.star(removed).len());
+        if vk + vr > MAX_VALENCE + 4 && vk.min(vr) > 4 {
+            return Err(Refusal::Valence);
+        }
+        if work.pinches_seam(e) {
+            return Err(Refusal::Border);
+        }
+        if t.link_condition_of_regular(e, kept, &mut work.marks).is_err() {
+            return Err(Refusal::Link);
+        }
+        let (gone, points) = (t.edge_faces(e), &work.points);
+        self.ring.clear();
+        gather_ring(t, points, removed, gone, &mut self.ring);
+        let of_removed = self.ring.len();
+        gather_ring(t, points, kept, gone, &mut self.ring);
+        let mut to = c.to;
+        let inner = |v: VertexId| work.kinds[v.index()] == Kind::Interior;
+        if self.placement == Placement::Optimal && !fixed && inner(kept) && inner(removed) {
+            let origin = points[kept.index()];
+            let wings = gone.iter().map(|&f| t.triangle(f).map(|v| points[v.index()]));
+            let q = self.quadrics[kept.index()]
+                .plus(&self.quadrics[removed.index()].moved(origin - points[removed.index()]));
+            let reach = VOLUME_REACH * origin.distance(points[removed.index()]);
+            to += volume_correction(&q, &self.ring, wings, origin, to, reach);
+        }
+        // A kept vertex that does not move changes none of its own faces.
+        let moving = if to == points[kept.index()] { &self.ring[..of_removed] } else { &self.ring[..] };
+        if !moving.iter().all(|f| f.stays_good(to)) {
+            return Err(Refusal::Flip);
+        }
+        Ok(to)
+    }
+
+    fn collapse(&mut self, e: EdgeId, c: &Candidate, to: DVec3) {
         let Roles { kept, removed, .. } = c.roles;
         let (k, r) = (kept.index(), removed.index());
         let (pk, pr) = (self.work.points[k], self.work.points[r]);
-        let q = self.quadrics[k].plus(&self.quadrics[r].moved(pk - pr));
+        let q = self.quadrics[k].plus(&self.quadrics[r].moved(pk - pr)).moved(to - pk);
         if q.weight > 0.0 {
-            self.worst = self.worst.max(c.cost / q.weight);
+            self.worst = self.worst.max(q.at(DVec3::ZERO) / q.weight);
         }
-        self.wedges.merge(&mut self.work, e, &c.roles, c.to);
-        self.quadrics[k] = q.moved(c.to - pk);
-        self.work.perform(e, &c.roles, c.to);
+        self.wedges.merge(&mut self.work, e, &c.roles, to);
+        self.quadrics[k] = q;
+        self.work.perform(e, &c.roles, to);
     }
 
     /// Estimated error so far, model units: the root of the largest cost per weight.
@@ -160,6 +203,41 @@ impl<'m> Collapser<'m> {
         let weight = self.quadrics[c.roles.kept.index()].weight + self.quadrics[c.roles.removed.index()].weight;
         c.cost <= self.bound * weight
     }
+}
+
+/// The step from `to` that makes the faces around the edge enclose the volume they did, least in the quadric's metric.
+///
+/// Optimal placement alone shrinks convex parts and fills concave ones; keeping the volume (the linear constraint of Lindstrom & Turk 1998)
+/// on top of accumulated quadrics takes 4-15 % off the rms. Zero where the step would be longer than `reach`.
+fn volume_correction(
+    q: &Quadric,
+    ring: &[RingFace],
+    wings: impl Iterator<Item = [DVec3; 3]>,
+    origin: DVec3,
+    to: DVec3,
+    reach: f64,
+) -> DVec3 {
+    // Volume between the faces and their copies with the apex at p: (g.(p - origin) - h) / 6.
+    let (mut g, mut h) = (DVec3::ZERO, 0.0);
+    let mut add = |x: DVec3, y: DVec3, z: DVec3| {
+        let n = (y - x).cross(z - x);
+        g += n;
+        h += n.dot(x);
+    };
+    for f in ring {
+        add(f.apex - origin, f.x - origin, f.y - origin);
+    }
+    for [x, y, z] in wings {
+        add(x - origin, y - origin, z - origin);
+    }
+    let along = Quadric { a: q.a, b: -g, c: 0.0, weight: 0.0 };
+    let Some(d) = along.minimise(DVec3::ZERO, VOLUME_PULL * q.trace() / 3.0) else { return DVec3::ZERO };
+    let gd = g.dot(d);
+    if gd <= 0.0 {
+        return DVec3::ZERO;
+    }
+    let step = d * ((h - g.dot(to - origin)) / gd);
+    if step.length_squared() <= reach * reach { step } else { DVec3::ZERO }
 }
 
 /// The best of three places.
