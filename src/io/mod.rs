@@ -173,7 +173,7 @@ pub fn decode(format: Format, bytes: &[u8], side: &dyn Side) -> Result<Decoded, 
     match format {
         Format::Obj => obj::decode(bytes, side),
         Format::Gltf | Format::Glb => gltf::decode(bytes, side),
-        Format::Ply => ply::decode(bytes),
+        Format::Ply => ply::decode(bytes, side),
         Format::Stl => stl::decode(bytes),
         Format::Off => off::decode(bytes),
     }

@@ -27,11 +27,6 @@ impl Notes {
         }
     }
 
-    /// The first line noted as `what`.
-    pub(crate) fn first_line(&self, what: &str) -> Option<usize> {
-        self.list.iter().find(|n| n.what == what).map(|n| n.line)
-    }
-
     /// One sentence for each kind, in order of first appearance.
     pub(crate) fn into_warnings(self) -> Vec<String> {
         let say = |n: Note| match n.count {
@@ -52,7 +47,6 @@ mod tests {
         n.at(3, "a");
         n.at(5, "b");
         n.at(9, "a");
-        assert_eq!(n.first_line("a"), Some(3));
         assert_eq!(n.into_warnings(), ["line 3 and 1 more: a", "line 5: b"]);
     }
 

@@ -14,3 +14,5 @@ mod write;
 
 pub use read::decode;
 pub use write::encode;
+
+pub(crate) use mtl::image_names;

@@ -76,6 +76,11 @@ impl<'a> Cursor<'a> {
         self.at
     }
 
+    /// Bytes from the cursor on.
+    pub(crate) fn left(&self) -> usize {
+        self.bytes.len() - self.at
+    }
+
     /// True if nothing is left, not even the end of a line.
     #[inline]
     pub(crate) fn at_end(&self) -> bool {
@@ -239,6 +244,12 @@ const POWERS: [f64; 23] = [
 ];
 
 impl Number {
+    /// A number that was not written in digits: it fits f32 only if it is one.
+    #[inline]
+    pub(crate) fn exact(value: f64) -> Number {
+        Number { value, last: -400 }
+    }
+
     /// Parses a whole token: decimals, and the spellings of infinity and NaN that C libraries print.
     pub(crate) fn parse(token: &[u8]) -> Option<Number> {
         match scan_number(token) {
@@ -411,9 +422,20 @@ impl PointsReader {
             let axis = b"xyz"[k] as char;
             return Err(line_error(line, format!("{axis} is {}; coordinates must be finite", v[k])));
         }
-        self.single = self.single && p[0].fits_f32() && p[1].fits_f32() && p[2].fits_f32();
-        self.points.push(v);
+        self.push_finite(p);
         Ok(())
+    }
+
+    /// Adds a point that was found to be finite.
+    #[inline]
+    pub(crate) fn push_finite(&mut self, p: [Number; 3]) {
+        self.single = self.single && p[0].fits_f32() && p[1].fits_f32() && p[2].fits_f32();
+        self.points.push(p.map(|x| x.value));
+    }
+
+    /// Makes room for this many more points.
+    pub(crate) fn reserve(&mut self, points: usize) {
+        self.points.reserve(points);
     }
 
     /// Number of points so far.

@@ -198,7 +198,7 @@ fn mime_of(name: &str, data: Option<&[u8]>) -> Option<String> {
 }
 
 /// Names under which images are written beside the file: never absolute, never up a folder, each once.
-pub(super) fn image_names(images: &[Image], stem: &str) -> Vec<String> {
+pub(crate) fn image_names(images: &[Image], stem: &str) -> Vec<String> {
     let mut names: Vec<String> = Vec::with_capacity(images.len());
     let mut taken = std::collections::BTreeSet::new();
     for (i, image) in images.iter().enumerate() {
