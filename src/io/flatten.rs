@@ -41,15 +41,15 @@ pub(crate) fn flatten<'a>(scene: &'a Scene, format: &str) -> Flat<'a> {
     if instances.iter().any(|i| i.matrix != DMat4::IDENTITY) {
         warnings.push(format!("{format} has no nodes: their transforms are applied to the vertices"));
     }
-    if let [only] = &instances[..] {
-        if only.matrix == DMat4::IDENTITY {
-            return Flat {
-                geometry: Cow::Borrowed(&only.mesh.geometry),
-                groups: Cow::Borrowed(&only.mesh.groups),
-                name: only.name,
-                warnings,
-            };
-        }
+    if let [only] = &instances[..]
+        && only.matrix == DMat4::IDENTITY
+    {
+        return Flat {
+            geometry: Cow::Borrowed(&only.mesh.geometry),
+            groups: Cow::Borrowed(&only.mesh.groups),
+            name: only.name,
+            warnings,
+        };
     }
     let name = if let [only] = &instances[..] { only.name } else { None };
     let (geometry, groups) = merge(&instances);

@@ -12,7 +12,6 @@ pub mod obj;
 pub mod off;
 pub mod ply;
 pub mod stl;
-#[allow(dead_code)] // for now: its users are being written
 pub(crate) mod text;
 
 use crate::scene::Scene;

@@ -289,8 +289,10 @@ impl Number {
             0..=22 => POWERS[e as usize],
             _ => 10f64.powi(e),
         };
-        // A little over half: the value itself is rounded, and a print of an f32 may lie just half a unit off.
-        error <= 0.500_001 * unit
+        // A little over half, since a print of an f32 may lie just half a unit off; and half the distance to the next double, by
+        // which the value itself was rounded. The latter is less than the least error there is, so 17 digits always tell.
+        let rounding = f64::from_bits(self.value.to_bits() & 0x7ff0_0000_0000_0000) * (0.5 * f64::EPSILON);
+        error <= 0.500_001 * unit + rounding
     }
 }
 
@@ -536,6 +538,8 @@ mod tests {
         {
             assert!(!fits(s), "{s}");
         }
+        // 16 digits, a double next to an f32; 17 digits of the same double.
+        assert!(fits("0.05657500028610229") && !fits("0.056575000286102288"));
         assert!(fits("340282350000000000000000000000000000000"));
     }
 
@@ -644,8 +648,22 @@ mod tests {
             for write in [write_f64, write_f64_long] {
                 let mut out = Vec::new();
                 write(&mut out, x);
-                prop_assert_eq!(Number::parse(&out).unwrap().value.to_bits(), bits);
+                let n = Number::parse(&out).unwrap();
+                prop_assert_eq!(n.value.to_bits(), bits);
             }
+            let mut out = Vec::new();
+            write_f64_long(&mut out, x);
+            prop_assert_eq!(Number::parse(&out).unwrap().fits_f32(), x as f32 as f64 == x);
+        }
+
+        #[test]
+        fn doubles_next_to_an_f32_are_told_by_17_digits(bits: u32, up: bool) {
+            let near = f32::from_bits(bits) as f64;
+            prop_assume!(near.is_normal());
+            let x = if up { near.next_up() } else { near.next_down() };
+            let mut out = Vec::new();
+            write_f64_long(&mut out, x);
+            prop_assert!(!Number::parse(&out).unwrap().fits_f32());
         }
 
         #[test]
