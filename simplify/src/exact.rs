@@ -5,9 +5,8 @@
 
 use crate::collapser::Collapser;
 use crate::options::{Control, Stop};
+use crate::radix_heap::RadixHeap;
 use progmesh_aif::{Bits, EdgeId};
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 /// What to stop at.
 pub(crate) struct Goal {
@@ -50,8 +49,8 @@ impl Numbering {
 
 /// Orders by cost, then by edge: no negative costs, so the bits of an f32 sort as it does.
 #[inline]
-fn key(cost: f64, n: u32) -> Reverse<u64> {
-    Reverse((((cost as f32).to_bits() as u64) << 32) | n as u64)
+fn key(cost: f64, n: u32) -> u64 {
+    (((cost as f32).to_bits() as u64) << 32) | n as u64
 }
 
 /// Runs until the goal is met. `factors[i]` turns costs of mesh `i` into common ones.
@@ -64,23 +63,22 @@ pub(crate) fn run(
     let numbering = Numbering::new(meshes);
     let mut left: usize = meshes.iter().map(|m| m.work.triangles).sum();
     let first = left;
-    let mut heap_entries = Vec::new();
+    let mut heap = RadixHeap::new();
     for (i, m) in meshes.iter_mut().enumerate() {
         let edges: Vec<EdgeId> = m.work.mesh.topology().edges().collect();
         for e in edges {
             match m.evaluate(e) {
-                Some(c) => heap_entries.push(key(c.cost * factors[i], numbering.number(i, e))),
+                Some(c) => heap.push(key(c.cost * factors[i], numbering.number(i, e))),
                 None => m.refused.locked += 1,
             }
         }
     }
-    let mut heap = BinaryHeap::from(heap_entries);
     // Edges refused where they stood: they get another chance when their surroundings change.
     let mut waiting: Vec<Bits> = meshes.iter().map(|m| Bits::new(m.work.mesh.topology().edge_slots())).collect();
     let mut bounded = false;
     let mut rounds = 0u32;
     while left > goal.triangles {
-        let Some(Reverse(top)) = heap.pop() else {
+        let Some(top) = heap.pop() else {
             break;
         };
         rounds = rounds.wrapping_add(1);
@@ -97,7 +95,7 @@ pub(crate) fn run(
         }
         let Some(c) = m.evaluate(e) else { continue };
         let now = key(c.cost * factors[i], top as u32);
-        if now.0 > top {
+        if now > top {
             heap.push(now);
             continue;
         }
@@ -111,7 +109,9 @@ pub(crate) fn run(
             for &x in m.work.mesh.topology().star(c.roles.kept) {
                 if waiting[i].get(x.index()) {
                     waiting[i].clear(x.index());
-                    heap.push(Reverse((top >> 32 << 32) | numbering.number(i, x) as u64));
+                    // Due at once, or just behind: its true cost is found out when it comes up.
+                    let due = (top >> 32 << 32) | numbering.number(i, x) as u64;
+                    heap.push(if due < top { due + (1 << 32) } else { due });
                 }
             }
         } else {

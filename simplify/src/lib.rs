@@ -12,6 +12,7 @@ mod collapser;
 mod exact;
 mod options;
 mod quadric;
+mod radix_heap;
 mod validity;
 mod wedges;
 mod work;
