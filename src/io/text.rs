@@ -398,7 +398,7 @@ pub(crate) fn scan_int(s: &[u8]) -> Option<(i64, usize)> {
         value = value * 10 + d as i64;
         i += 1;
     }
-    (i > signed).then_some((if s[0] == b'-' { -value } else { value }, i))
+    (i > signed).then_some((if s.first() == Some(&b'-') { -value } else { value }, i))
 }
 
 /// Collects points of a text file and decides their precision by the rule of this module.
@@ -617,7 +617,7 @@ mod tests {
     fn integers_stop_at_what_is_no_digit() {
         assert_eq!(scan_int(b"-12/3"), Some((-12, 3)));
         assert_eq!(scan_int(b"+7"), Some((7, 2)));
-        assert_eq!(scan_int(b"-"), None);
+        assert_eq!((scan_int(b"-"), scan_int(b"")), (None, None));
         assert_eq!(scan_int(b"99999999999999999999"), None);
     }
 

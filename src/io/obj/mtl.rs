@@ -2,6 +2,7 @@
 
 use crate::io::Side;
 use crate::scene::{Image, Material};
+use std::borrow::Cow;
 use std::fmt::Write;
 
 /// Materials and images gathered from all `mtllib` of a file.
@@ -69,7 +70,9 @@ impl Library {
 
     fn material(&mut self, name: String, raw: String, file: &str, folder: &str, side: &dyn Side) -> Material {
         let parse = |text: &str| {
-            let text = format!("newmtl x\n{text}");
+            let text = text
+                .lines()
+                .try_fold("newmtl x\n".to_string(), |t, l| Some(t + &three_numbers(l)? + "\n"))?;
             tobj::load_mtl_buf(&mut text.as_bytes()).ok().and_then(|(m, _)| m.into_iter().next())
         };
         let parsed = parse(&raw).or_else(|| {
@@ -128,6 +131,19 @@ impl Library {
         let mime = mime_of(name, data.as_deref());
         self.images.push(Image { name: None, uri: Some(name.to_string()), mime, data });
         self.images.len() - 1
+    }
+}
+
+/// A colour statement with all its three numbers: tobj panics on fewer. One alone stands for all, as the format says; two are wrong.
+fn three_numbers(line: &str) -> Option<Cow<'_, str>> {
+    let mut words = line.split_whitespace();
+    if !matches!(words.next(), Some("Ka" | "Kd" | "Ks" | "Ke")) {
+        return Some(line.into());
+    }
+    match (words.next(), words.next(), words.next()) {
+        (Some(_), Some(_), Some(_)) => Some(line.into()),
+        (Some(gray), None, None) => Some(format!("{line} {gray} {gray}").into()),
+        _ => None,
     }
 }
 
@@ -298,6 +314,14 @@ mod tests {
         assert_eq!(texture("map_Kd -clamp on 1.png"), Some(("map_Kd", "1.png")));
         assert_eq!(texture("map_Kd"), None);
         assert_eq!(texture("Kd 1 1 1"), None);
+    }
+
+    #[test]
+    fn colours_of_one_number_are_gray_and_of_two_are_wrong() {
+        assert_eq!(three_numbers("Kd 0.5").as_deref(), Some("Kd 0.5 0.5 0.5"));
+        assert_eq!(three_numbers("Kd 0.5 1").as_deref(), None);
+        assert_eq!(three_numbers("Ks").as_deref(), None);
+        assert_eq!(three_numbers("d 1").as_deref(), Some("d 1"));
     }
 
     #[test]

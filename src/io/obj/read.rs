@@ -668,8 +668,8 @@ mod tests {
 
     #[test]
     fn one_long_number_makes_the_file_double() {
-        let d = read("v 0.1 0 0\nv 0.08156099999999999 0 0\n");
-        assert_eq!(d.scene.meshes[0].geometry.positions.get(1).x.to_string(), "0.08156099999999999");
+        let d = read("v 0.1 0 0\nv 0.0815609999 0 0\n");
+        assert_eq!(d.scene.meshes[0].geometry.positions.get(1).x, 0.0815609999);
         let d = read("v 0.1 0 0\nv 0.081561 0 0\n");
         assert!(!d.scene.meshes[0].geometry.positions.is_f64());
     }
