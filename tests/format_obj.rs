@@ -239,3 +239,42 @@ fn damaged_files_never_panic() {
         }
     }
 }
+
+#[test]
+fn what_obj_cannot_hold_is_said_once() {
+    use progmesh::aif::{Channel, Wedges};
+    let mut g = MeshInput::triangles(vec![[0.0f32; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &[[0, 1, 2]]);
+    let channels = [
+        (Semantic::Tangent, 4),
+        (Semantic::TexCoord(1), 2),
+        (Semantic::TexCoord(2), 2),
+        (Semantic::Color(0), 4),
+        (Semantic::Joints(0), 4),
+        (Semantic::Weights(0), 4),
+        (Semantic::MorphPosition(0), 3),
+        (Semantic::MorphPosition(1), 3),
+        (Semantic::Custom("heat".into()), 1),
+    ];
+    let mut w = Wedges::new(channels.map(|(s, n)| Channel::new(s, n)).to_vec()).unwrap();
+    w.push(&vec![0.5; w.stride()], u64::MAX >> (64 - 9));
+    w.corner = vec![0; 3];
+    g.wedges = Some(w);
+    let out = write(&scene(g));
+    let want = [
+        "OBJ cannot hold tangents",
+        "OBJ cannot hold a second set of texture coordinates",
+        "OBJ cannot hold joints and weights",
+        "OBJ cannot hold morph targets",
+        "OBJ cannot hold the attribute heat",
+        "OBJ cannot hold the alpha of vertex colours",
+    ];
+    assert_eq!(out.warnings, want);
+    assert!(String::from_utf8_lossy(&out.bytes).starts_with("v 0 0 0 0.5 0.5 0.5\n"));
+}
+
+#[test]
+fn doubles_whose_digits_look_single_stay_double() {
+    let p = Positions::F64(vec![[0.1, 0.2, 0.5], [1.0, 0.0, 0.0], [0.0, 1.0, 0.3]]);
+    let out = write(&scene(MeshInput::triangles(p.clone(), &[[0, 1, 2]])));
+    assert_eq!(read(&out.bytes, &NoSide).scene.meshes[0].geometry.positions, p);
+}

@@ -5,11 +5,11 @@ use proptest::prelude::*;
 
 /// Which attributes a mesh gets.
 #[derive(Clone, Copy)]
-pub struct Kinds {
+pub(crate) struct Kinds {
     /// Normals and texture coordinates may differ between the corners of a vertex, or be absent.
-    pub per_corner: bool,
+    pub(crate) per_corner: bool,
     /// Custom channels, stored as these encodings.
-    pub custom: &'static [Encoding],
+    pub(crate) custom: &'static [Encoding],
 }
 
 fn finite_f32() -> impl Strategy<Value = f32> {
@@ -56,7 +56,7 @@ fn mix(a: u32, b: u32) -> u32 {
 }
 
 /// Polygons of 3 to 6 corners on 3 to 12 vertices, with attributes and wires.
-pub fn mesh(kinds: Kinds) -> impl Strategy<Value = MeshInput> {
+pub(crate) fn mesh(kinds: Kinds) -> impl Strategy<Value = MeshInput> {
     (3usize..12, any::<u32>(), any::<[bool; 3]>()).prop_flat_map(move |(n, seed, has)| {
         let faces = prop::collection::vec(prop::collection::vec(0..n as u32, 3..7), 0..10);
         let wires = prop::collection::vec(prop::array::uniform2(0..n as u32), 0..3);
@@ -112,13 +112,13 @@ pub fn mesh(kinds: Kinds) -> impl Strategy<Value = MeshInput> {
 }
 
 /// The bits of channel `semantic` at a corner.
-pub fn value(mesh: &MeshInput, corner: usize, semantic: &Semantic) -> Option<Vec<u32>> {
+pub(crate) fn value(mesh: &MeshInput, corner: usize, semantic: &Semantic) -> Option<Vec<u32>> {
     let w = mesh.wedges.as_ref()?;
     w.get(w.corner[corner], w.channel(semantic)?).map(|v| v.iter().map(|x| x.to_bits()).collect())
 }
 
 /// Bits of the positions, with their width.
-pub fn bits(positions: &Positions) -> Vec<u64> {
+pub(crate) fn bits(positions: &Positions) -> Vec<u64> {
     match positions {
         Positions::F32(p) => p.iter().flatten().map(|x| x.to_bits() as u64).collect(),
         Positions::F64(p) => p.iter().flatten().map(|x| x.to_bits()).chain([64]).collect(),
@@ -126,7 +126,7 @@ pub fn bits(positions: &Positions) -> Vec<u64> {
 }
 
 /// Asserts that two meshes hold the same faces and positions, and the same value of every channel of `a` at every corner.
-pub fn assert_same(a: &MeshInput, b: &MeshInput) {
+pub(crate) fn assert_same(a: &MeshInput, b: &MeshInput) {
     assert_eq!(bits(&a.positions), bits(&b.positions));
     assert_eq!((&a.face_sizes, &a.corners, &a.wires), (&b.face_sizes, &b.corners, &b.wires));
     for channel in a.wedges.iter().flat_map(|w| w.channels()) {
@@ -138,7 +138,7 @@ pub fn assert_same(a: &MeshInput, b: &MeshInput) {
 }
 
 /// Decodes every truncation of a file, and the file with each of a number of bytes changed: nothing may panic.
-pub fn mangle(format: progmesh::io::Format, bytes: &[u8]) {
+pub(crate) fn mangle(format: progmesh::io::Format, bytes: &[u8]) {
     use progmesh::io::{NoSide, decode};
     for n in 0..bytes.len() {
         let _ = decode(format, &bytes[..n], &NoSide);
@@ -150,7 +150,7 @@ pub fn mangle(format: progmesh::io::Format, bytes: &[u8]) {
             state = mix(state, 77);
             let at = state as usize % copy.len();
             state = mix(state, 78);
-            copy[at] = if state % 2 == 0 { state as u8 } else { copy[at] ^ (1 << (state >> 8 & 7)) };
+            copy[at] = if state & 1 == 0 { state as u8 } else { copy[at] ^ (1 << (state >> 8 & 7)) };
         }
         if let Ok(d) = decode(format, &copy, &NoSide) {
             for mesh in d.scene.meshes {

@@ -195,7 +195,7 @@ fn texture(line: &str) -> Option<(&str, &str)> {
 }
 
 /// The media type, by the first bytes, else by the extension.
-fn mime_of(name: &str, data: Option<&[u8]>) -> Option<String> {
+pub(crate) fn mime_of(name: &str, data: Option<&[u8]>) -> Option<String> {
     let by_bytes = match data.unwrap_or(&[]) {
         [0x89, b'P', b'N', b'G', ..] => Some("image/png"),
         [0xff, 0xd8, 0xff, ..] => Some("image/jpeg"),

@@ -3,6 +3,7 @@
 use super::header::{Element, Format, Header, Kind, Scalar};
 use super::{COLOR_NAMES, TEXTURE_NAMES};
 use crate::aif::{Bits, Channel, Encoding, MeshInput, NONE, Semantic, Wedges};
+use crate::io::obj::mime_of;
 use crate::io::text::{Cursor, Number, PointsReader, line_error};
 use crate::io::{DecodeError, Decoded, Side};
 use crate::scene::{Image, Material, Scene, SceneMesh};
@@ -598,7 +599,8 @@ impl<'h, S: Source> Reader<'h, S> {
                 }
             };
             let image = Some(scene.images.len());
-            scene.images.push(Image { uri: Some(name.clone()), mime: None, name: None, data });
+            let mime = mime_of(name, data.as_deref());
+            scene.images.push(Image { uri: Some(name.clone()), mime, name: None, data });
             scene.materials.push(Material {
                 name: name.clone(),
                 base_color_image: image,
