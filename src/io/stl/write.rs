@@ -53,7 +53,9 @@ fn facets(geometry: &MeshInput, warnings: &mut Vec<String>) -> Result<Vec<Facet>
                 return Err(cannot_hold(format!("face {face}: vertex {v} of {}", positions.len())));
             }
             if !positions.get(v as usize).is_finite() {
-                return Err(cannot_hold(format!("face {face}: vertex {v} has a coordinate that is not finite")));
+                return Err(cannot_hold(format!(
+                    "face {face}: vertex {v} has a coordinate that is not finite"
+                )));
             }
         }
         match *corners {
@@ -104,7 +106,11 @@ fn left_out(scene: &Scene, geometry: &MeshInput, warnings: &mut Vec<String>) {
         warnings.push(format!("STL holds triangles alone: {} are left out", lost.join(", ")));
     }
     let mut used = vec![false; geometry.positions.len()];
-    geometry.corners.iter().for_each(|&v| used[v as usize] = true);
+    for &v in &geometry.corners {
+        if let Some(u) = used.get_mut(v as usize) {
+            *u = true;
+        }
+    }
     let isolated = used.iter().filter(|&&u| !u).count();
     if isolated > 0 {
         warnings.push(format!("{isolated} vertices of no face are left out"));
@@ -191,7 +197,9 @@ fn text(flat: &Flat<'_>, facets: &[Facet]) -> Vec<u8> {
                     out.push(b' ');
                     match positions {
                         Positions::F32(p) => write_f32(&mut out, p[v as usize][k]),
-                        Positions::F64(p) if mark == Some((v, k)) => write_f64_long(&mut out, p[v as usize][k]),
+                        Positions::F64(p) if mark == Some((v, k)) => {
+                            write_f64_long(&mut out, p[v as usize][k])
+                        }
                         Positions::F64(p) => write_f64(&mut out, p[v as usize][k]),
                     }
                 }
@@ -209,9 +217,8 @@ fn text(flat: &Flat<'_>, facets: &[Facet]) -> Vec<u8> {
 
 fn line(out: &mut Vec<u8>, word: &str, name: &str) {
     out.extend_from_slice(word.as_bytes());
-    if !name.is_empty() {
-        out.push(b' ');
-        out.extend_from_slice(name.as_bytes());
-    }
+    // The blank stands even without a name: some readers know a text file by "solid " with it.
+    out.push(b' ');
+    out.extend_from_slice(name.as_bytes());
     out.push(b'\n');
 }
