@@ -79,10 +79,10 @@ pub fn encode(scene: &Scene, _: &EncodeOptions) -> Result<Encoded, EncodeError> 
             let _ = write!(out, " {v}");
         }
         at += n;
-        if let Some((k, of)) = &face_colors {
-            if of[f] != NONE && !row(of[f], *k).is_empty() {
-                padded(&mut out, row(of[f], *k), width(g, *k), bytes);
-            }
+        if let Some((k, of)) = &face_colors
+            && !row(of[f], *k).is_empty()
+        {
+            padded(&mut out, row(of[f], *k), width(g, *k), bytes);
         }
         out.push(b'\n');
     }
