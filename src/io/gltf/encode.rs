@@ -181,12 +181,6 @@ impl Writer {
         self.accessor(PoolKind::Indices(size), &bytes, accessor)
     }
 
-    /// An accessor without bytes: zeros.
-    pub(super) fn zeros(&mut self, accessor: Value) -> usize {
-        self.accessors.push(accessor);
-        self.base_accessor + self.accessors.len() - 1
-    }
-
     fn accessor(&mut self, kind: PoolKind, bytes: &[u8], rest: Value) -> usize {
         let (view, offset) = self.append(kind, bytes);
         let mut accessor = Map::new();

@@ -277,9 +277,9 @@ fn position_accessor(points: &[[f32; 3]], writer: &mut Writer) -> usize {
     writer.attribute(&bytes, 12, accessor)
 }
 
+/// Zeros for a morph target without displacements. The format has accessors without bytes for that; not every reader does.
 fn zero_position(count: usize, writer: &mut Writer) -> usize {
-    let zero = [0.0; 3];
-    writer.zeros(json!({"componentType": 5126, "count": count, "type": "VEC3", "min": zero, "max": zero}))
+    position_accessor(&vec![[0.0; 3]; count], writer)
 }
 
 /// An accessor of a column of values, in the encoding; each vertex takes a multiple of 4 bytes.

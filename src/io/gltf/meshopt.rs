@@ -207,7 +207,8 @@ fn apply(value: [u8; 4], delta: [u8; 4], mode: u8) -> [u8; 4] {
             [low[0], low[1], high[0], high[1]]
         }
         _ => {
-            let d = u32::from_le_bytes(delta).rotate_left((mode >> 4) as u32);
+            // The encoder rotates left.
+            let d = u32::from_le_bytes(delta).rotate_right((mode >> 4) as u32);
             (u32::from_le_bytes(value) ^ d).to_le_bytes()
         }
     }
@@ -408,3 +409,7 @@ fn color_16(e: &mut [u8; 8]) {
         put_half(e, k, ((c * 65535.0).round() as u16).to_le_bytes());
     }
 }
+
+#[cfg(test)]
+#[path = "meshopt_tests.rs"]
+mod tests;

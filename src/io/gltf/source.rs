@@ -304,7 +304,11 @@ fn remove_accessors(document: &mut Map<String, Value>, freed: &BTreeSet<usize>, 
     let list = array_of(document, "accessors");
     if !compact {
         for &i in freed {
+            let view = list[i].get("bufferView").cloned();
             list[i] = json!({"componentType": 5121, "count": 1, "type": "SCALAR"});
+            if let Some(view) = view {
+                list[i]["bufferView"] = view;
+            }
         }
         return;
     }
