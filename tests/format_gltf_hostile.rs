@@ -14,9 +14,11 @@ fn broken(change: impl FnOnce(&mut Value)) -> String {
     b.error()
 }
 
+type Change = Box<dyn FnOnce(&mut Value)>;
+
 #[test]
 fn errors_name_the_json_path() {
-    let cases: Vec<(Box<dyn FnOnce(&mut Value)>, &str)> = vec![
+    let cases: Vec<(Change, &str)> = vec![
         (Box::new(|d| d["asset"] = json!({})), "asset: has no version"),
         (
             Box::new(|d| d["asset"]["version"] = json!("1.0")),

@@ -123,7 +123,7 @@ impl<'a> At<'a> {
 
 /// A whole number that is not negative and fits.
 pub(super) fn uint(value: &Value) -> Option<usize> {
-    let exact = |f: f64| (f >= 0.0 && f < 9e15 && f.fract() == 0.0).then_some(f as u64);
+    let exact = |f: f64| ((0.0..9e15).contains(&f) && f.fract() == 0.0).then_some(f as u64);
     usize::try_from(value.as_u64().or_else(|| value.as_f64().and_then(exact))?).ok()
 }
 

@@ -130,7 +130,7 @@ fn attributes(stream: &[u8], count: usize, stride: usize) -> Stream<Vec<u8>> {
         return Err("has a channel mode that is not defined");
     }
 
-    let block_max = (8192 / stride & !15).min(256);
+    let block_max = ((8192 / stride) & !15).min(256);
     // A stream is trusted for memory only as far as its bytes go: each block is paid for by the bytes read for it.
     let mut out = Vec::with_capacity((count * stride).min(64 * stream.len()));
     let mut planes = vec![0u8; block_max * stride];
@@ -349,8 +349,8 @@ fn octahedral(x: f32, y: f32, one: f32, max: f32) -> [f32; 3] {
 
 fn octahedral_8(e: &mut [u8; 4]) {
     let r = octahedral(e[0] as i8 as f32, e[1] as i8 as f32, e[2] as i8 as f32, 127.0);
-    for k in 0..3 {
-        e[k] = r[k] as i8 as u8;
+    for (byte, value) in e.iter_mut().zip(r) {
+        *byte = value as i8 as u8;
     }
 }
 
@@ -365,8 +365,8 @@ fn put_half(e: &mut [u8; 8], k: usize, v: [u8; 2]) {
 fn octahedral_16(e: &mut [u8; 8]) {
     let v = halves(e);
     let r = octahedral(v[0] as f32, v[1] as f32, v[2] as f32, 32767.0);
-    for k in 0..3 {
-        put_half(e, k, (r[k] as i16).to_le_bytes());
+    for (k, value) in r.into_iter().enumerate() {
+        put_half(e, k, (value as i16).to_le_bytes());
     }
 }
 
