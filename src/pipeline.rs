@@ -6,6 +6,7 @@ use crate::aif::{BuildError, BuildOptions, BuildReport, CheckError, Mesh, MeshIn
 use crate::normals::{self, Normals};
 use crate::scene::{Scene, SceneMesh};
 use crate::simplify::{self, Control, Level, Options, Outcome, Refused, SimplifyError, Stop};
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 mod locks;
@@ -22,7 +23,7 @@ pub struct Job {
     ///
     /// Errors are measured in world units (see [`world_scales`]); a relative one is relative to the diagonal of the scene.
     pub options: Options,
-    /// Which vertices are one. Scenes from glTF are welded bit-equal at the least: a glTF mesh is cut at every seam.
+    /// Which vertices are one. The decoders of glTF and STL have welded what is equal to the bit already.
     pub weld: Weld,
     /// What becomes of the normals, afterwards.
     pub normals: Normals,
@@ -153,16 +154,17 @@ pub fn simplify_scene(
     let diagonal = scale::world_diagonal(&scene);
     let scales = world_scales(&scene);
 
-    let weld = weld_of(&scene, job.weld);
     let mut meshes = Vec::with_capacity(scene.meshes.len());
+    let mut changes = Changes::default();
     for i in 0..scene.meshes.len() {
         let label = label(&scene, i);
         let input = std::mem::take(&mut scene.meshes[i].geometry);
-        let (mesh, report) = Mesh::build(input, &BuildOptions::with_weld(weld))
+        let (mesh, report) = Mesh::build(input, &BuildOptions::with_weld(job.weld))
             .map_err(|source| JobError::Build { mesh: label.clone(), source })?;
-        say_report(&label, &report, job.weld != Weld::No, &mut warnings);
+        changes.add(&label, &report, job.weld != Weld::No);
         meshes.push(mesh);
     }
+    warnings.extend(changes.warnings());
     let triangles: Vec<usize> = meshes.iter().map(Mesh::triangle_count).collect();
     let triangles_in: usize = triangles.iter().sum();
     if triangles_in == 0 {
@@ -239,11 +241,6 @@ pub fn simplify_scene(
     Ok((scene, summary))
 }
 
-/// The rule of welding for this scene, when `asked` is what the caller wants.
-pub fn weld_of(scene: &Scene, asked: Weld) -> Weld {
-    if asked == Weld::No && scene.gltf.is_some() { Weld::BitEqual } else { asked }
-}
-
 /// How messages name mesh `i`: empty when there is but one, else its number and name, with a colon.
 pub fn label(scene: &Scene, i: usize) -> String {
     match scene.meshes.get(i).map(|m| &m.name) {
@@ -253,22 +250,51 @@ pub fn label(scene: &Scene, i: usize) -> String {
     }
 }
 
-/// Says what building changed.
-fn say_report(label: &str, report: &BuildReport, welding: bool, warnings: &mut Vec<String>) {
-    let mut say = |faces: &[u32], what: &str| {
-        if let Some(first) = faces.first() {
-            warnings.push(format!("{label}{} {what} (the first: face {first})", count(faces.len(), "face")));
+/// What building changed, over all meshes: each kind is said once, with its first element.
+#[derive(Default)]
+struct Changes {
+    /// Number of elements, number of meshes, the first element; by kind.
+    kinds: BTreeMap<&'static str, (usize, usize, String)>,
+}
+
+impl Changes {
+    const KINDS: [(&'static str, &'static str); 5] = [
+        ("face", "with fewer than three distinct corners left out"),
+        ("face", "with a corner repeated, now once"),
+        ("face", "that visit a vertex twice, split there"),
+        ("line segment", "of no length left out"),
+        ("vertex", "welded to another"),
+    ];
+
+    /// Adds those of one mesh, which messages call `label`.
+    fn add(&mut self, label: &str, report: &BuildReport, welding: bool) {
+        let lists = [&report.dropped_faces, &report.shortened_faces, &report.split_faces];
+        for ((_, text), faces) in Self::KINDS.iter().zip(lists) {
+            let first = faces.first().map_or(String::new(), |f| format!("{label}face {f}"));
+            self.count(text, faces.len(), first);
         }
-    };
-    say(&report.dropped_faces, "with fewer than three distinct corners left out");
-    say(&report.shortened_faces, "with a corner repeated, now once");
-    say(&report.split_faces, "that visit a vertex twice, split there");
-    if report.dropped_wires > 0 {
-        warnings
-            .push(format!("{label}{} of no length left out", count(report.dropped_wires, "line segment")));
+        self.count(Self::KINDS[3].1, report.dropped_wires, String::new());
+        if welding {
+            self.count(Self::KINDS[4].1, report.welded_vertices, String::new());
+        }
     }
-    if welding {
-        warnings.push(format!("{label}{} welded", count(report.welded_vertices, "vertex")));
+
+    fn count(&mut self, text: &'static str, n: usize, first: String) {
+        if n > 0 {
+            let kind = self.kinds.entry(text).or_insert((0, 0, first));
+            kind.0 += n;
+            kind.1 += 1;
+        }
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let say = |&(what, text): &(&str, &str)| {
+            let (n, meshes, first) = self.kinds.get(text)?;
+            let meshes = if *meshes > 1 { format!(", in {meshes} meshes") } else { String::new() };
+            let first = if first.is_empty() { String::new() } else { format!(" (the first: {first})") };
+            Some(format!("{} {text}{meshes}{first}", count(*n, what)))
+        };
+        Self::KINDS.iter().filter_map(say).collect()
     }
 }
 
@@ -372,7 +398,7 @@ pub struct Preparation {
 /// Checks all meshes and does what is asked for, nothing else: unless vertices are welded or polygons cut, even degenerate
 /// faces stay. Returns warnings.
 pub fn prepare(scene: &mut Scene, how: &Preparation) -> Result<Vec<String>, JobError> {
-    let mut warnings = Vec::new();
+    let mut changes = Changes::default();
     for i in 0..scene.meshes.len() {
         let label = label(scene, i);
         let SceneMesh { geometry, .. } = &mut scene.meshes[i];
@@ -383,7 +409,7 @@ pub fn prepare(scene: &mut Scene, how: &Preparation) -> Result<Vec<String>, JobE
             let input: MeshInput = std::mem::take(geometry);
             let (mut mesh, report) =
                 Mesh::build(input, &BuildOptions::with_weld(how.weld)).map_err(failed)?;
-            say_report(&label, &report, how.weld != Weld::No, &mut warnings);
+            changes.add(&label, &report, how.weld != Weld::No);
             if how.triangulate {
                 mesh = mesh.triangulate().map_err(failed)?.mesh;
             }
@@ -391,5 +417,5 @@ pub fn prepare(scene: &mut Scene, how: &Preparation) -> Result<Vec<String>, JobE
         }
         normals::apply(geometry, how.normals)?;
     }
-    Ok(warnings)
+    Ok(changes.warnings())
 }

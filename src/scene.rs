@@ -19,7 +19,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Images that materials refer to.
     pub images: Vec<Image>,
-    /// What a glTF file holds beside its meshes, carried through to a glTF output.
+    /// What a glTF file holds beside its meshes, carried through to a glTF output. Where it is there, texture coordinates are as glTF
+    /// has them (v runs down); elsewhere v runs up. [`crate::io::encode`] turns them over as the output needs.
     pub gltf: Option<Box<crate::io::gltf::Source>>,
 }
 

@@ -5,7 +5,7 @@ use super::control::{Interrupt, Progress};
 use super::{Failure, common::name};
 use clap::ValueEnum;
 use progmesh::io::files;
-use progmesh::pipeline::{Job, JobError, Summary, simplify_scene};
+use progmesh::pipeline::{Job, JobError, Summary, count, simplify_scene};
 use progmesh::simplify::{self as engine, MaxError, SimplifyError, Stop};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -186,8 +186,8 @@ impl Args {
         written?;
         match summary.target {
             Some(target) if summary.missed_target() => Err(Failure::Missed(format!(
-                "{file}: {} triangles are left of the {} asked for: no further collapse is legal. {}",
-                thousands(summary.triangles_out),
+                "{file}: {} left, more than the {} asked for: no further collapse is legal. {}",
+                count(summary.triangles_out, "triangle"),
                 thousands(target),
                 self.advice(&summary)
             ))),

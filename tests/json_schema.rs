@@ -1,0 +1,226 @@
+//! The objects of `--json` have exactly the fields that docs/json.md documents.
+#![allow(dead_code)] // the fields are there to be demanded
+
+mod common;
+
+use common::Place;
+use serde::Deserialize;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Simplify {
+    command: String,
+    method: String,
+    faces_in: usize,
+    faces_out: usize,
+    vertices_out: usize,
+    seconds: Seconds,
+    stop: String,
+    estimate: Option<f64>,
+    #[serde(deserialize_with = "present")]
+    measured: Option<Measured>,
+    levels: Vec<Level>,
+    aif_bytes: usize,
+    #[serde(deserialize_with = "present")]
+    peak_bytes: Option<u64>,
+    warnings: Vec<String>,
+}
+
+/// An optional value whose key must be there all the same.
+fn present<'de, D: serde::Deserializer<'de>, T: Deserialize<'de>>(d: D) -> Result<Option<T>, D::Error> {
+    Option::deserialize(d)
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Seconds {
+    read: f64,
+    build: f64,
+    simplify: f64,
+    write: f64,
+    total: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Measured {
+    max: f64,
+    rms: f64,
+    mean: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Level {
+    pass: usize,
+    faces: usize,
+    seconds: f64,
+    tried: u64,
+    refused: Refused,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Refused {
+    link: u64,
+    normal: u64,
+    border: u64,
+    flip: u64,
+    valence: u64,
+    locked: u64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Info {
+    command: String,
+    file: String,
+    format: String,
+    bytes: usize,
+    nodes: usize,
+    instances: usize,
+    meshes: Vec<Mesh>,
+    materials: Vec<String>,
+    images: Vec<Image>,
+    #[serde(deserialize_with = "present")]
+    check: Option<String>,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Mesh {
+    #[serde(deserialize_with = "present")]
+    name: Option<String>,
+    vertices: usize,
+    edges: usize,
+    faces: usize,
+    triangles: usize,
+    face_sizes: FaceSizes,
+    vertex_kinds: VertexKinds,
+    edge_kinds: EdgeKinds,
+    border_loops: usize,
+    components: usize,
+    euler: i64,
+    #[serde(deserialize_with = "present")]
+    genus: Option<usize>,
+    manifold: bool,
+    closed: bool,
+    orientable: bool,
+    #[serde(deserialize_with = "present")]
+    bounds: Option<[[f64; 3]; 2]>,
+    diagonal: f64,
+    precision: String,
+    attributes: Vec<Attribute>,
+    materials: Vec<Part>,
+    groups: Vec<Part>,
+    aif_bytes: usize,
+    problems: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FaceSizes {
+    triangles: usize,
+    quads: usize,
+    larger: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct VertexKinds {
+    isolated: usize,
+    cut: usize,
+    dangling: usize,
+    complex: usize,
+    border: usize,
+    interior: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EdgeKinds {
+    isolated: usize,
+    dangling: usize,
+    border: usize,
+    regular: usize,
+    complex: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Attribute {
+    name: String,
+    width: usize,
+    encoding: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Part {
+    name: String,
+    faces: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Image {
+    #[serde(deserialize_with = "present")]
+    name: Option<String>,
+    #[serde(deserialize_with = "present")]
+    mime: Option<String>,
+    #[serde(deserialize_with = "present")]
+    bytes: Option<usize>,
+}
+
+#[test]
+fn simplify_prints_one_object_with_the_documented_fields() {
+    let p = Place::new();
+    p.generate("torus", "in.obj", 600);
+    for method in ["quadric --ratio 0.5", "nsa --ratio 0.5 --epsilon 60", "cluster --ratio 0.5"] {
+        let run = p.run(&format!("simplify in.obj out.obj --json --method {method}"));
+        let s: Simplify = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!((s.command.as_str(), method.starts_with(&s.method)), ("simplify", true));
+        assert!(["target", "error", "passes", "no_legal_collapse", "cancelled"].contains(&s.stop.as_str()));
+        let t = &s.seconds;
+        let parts = [t.read, t.build, t.simplify, t.write];
+        assert!(parts.iter().all(|&x| x >= 0.0) && parts.iter().sum::<f64>() <= t.total + 1e-3);
+        assert!(s.faces_out < s.faces_in && s.vertices_out > 0 && s.aif_bytes > 0);
+        assert!(!s.levels.is_empty() && s.levels.last().is_some_and(|l| l.faces == s.faces_out));
+        assert_eq!(s.peak_bytes.is_some(), cfg!(target_os = "linux"));
+    }
+}
+
+#[test]
+fn info_prints_one_object_with_the_documented_fields() {
+    let p = Place::new();
+    p.generate("quad-sphere", "in.obj", 96);
+    let run = p.done("info in.obj --json --check");
+    let i: Info = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!((i.command.as_str(), i.check.as_deref()), ("info", Some("ok")));
+    assert_eq!((i.meshes[0].faces, i.meshes[0].face_sizes.quads), (96, 96));
+    assert_eq!(i.images.len(), 1);
+}
+
+#[test]
+fn every_field_is_documented() {
+    let documentation = include_str!("../docs/json.md");
+    let p = Place::new();
+    p.generate("quad-sphere", "in.obj", 96);
+    let simplified = p.done("simplify in.obj out.obj --ratio 0.5 --json").json();
+    for object in [simplified, p.done("info in.obj --json").json()] {
+        let mut values = vec![&object];
+        while let Some(v) = values.pop() {
+            match v {
+                serde_json::Value::Object(fields) => {
+                    for (name, value) in fields {
+                        assert!(documentation.contains(&format!("`{name}`")), "{name} is not documented");
+                        values.push(value);
+                    }
+                }
+                serde_json::Value::Array(all) => values.extend(all),
+                _ => {}
+            }
+        }
+    }
+}
