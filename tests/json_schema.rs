@@ -207,7 +207,8 @@ fn every_field_is_documented() {
     let documentation = include_str!("../docs/json.md");
     let p = Place::new();
     p.generate("quad-sphere", "in.obj", 96);
-    let simplified = p.done("simplify in.obj out.obj --ratio 0.5 --json").json();
+    p.generate("torus", "torus.obj", 96);
+    let simplified = p.done("simplify torus.obj out.obj --ratio 0.5 --json").json();
     for object in [simplified, p.done("info in.obj --json").json()] {
         let mut values = vec![&object];
         while let Some(v) = values.pop() {
