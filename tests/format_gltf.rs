@@ -491,6 +491,13 @@ fn a_scene_of_another_format_becomes_a_document() {
     let origin = (0..5).find(|&v| g.positions.get(v) == glam::DVec3::ZERO).unwrap() as u32;
     assert_eq!(uv(origin), [0.0, 1.0], "v runs down in glTF");
 
+    let obj = String::from_utf8(encode(Format::Obj, &back).bytes).unwrap();
+    let vt = |b: &[u8]| {
+        io::decode(Format::Obj, b, &NoSide).unwrap().scene.meshes[0].geometry.wedges.clone().unwrap()
+    };
+    let first = vt(obj.as_bytes());
+    assert_eq!(first.get(first.corner[0], 0), Some(&[0.0, 0.0][..]), "and up again in OBJ: {obj}");
+
     let out = encode(Format::Gltf, &scene);
     let names: Vec<&str> = out.side.iter().map(|s| s.0.as_str()).collect();
     assert_eq!(names, ["out.bin", "tex/wood.png"]);

@@ -25,8 +25,34 @@ struct Instance<'a> {
     matrix: DMat4,
 }
 
+/// Turns all texture coordinates over, between an image origin at the upper left (glTF) and at the lower left (the other formats).
+pub(crate) fn turn_v_over(w: &mut Wedges) {
+    let is_uv = |c: &Channel| matches!(c.semantic, Semantic::TexCoord(_)) && c.width >= 2;
+    let uv: Vec<usize> =
+        (0..w.channels().len()).filter(|&k| is_uv(&w.channels()[k])).map(|k| w.offset(k) + 1).collect();
+    for i in 0..w.len() as u32 {
+        for &v in &uv {
+            let row = w.row_mut(i);
+            row[v] = 1.0 - row[v];
+        }
+    }
+}
+
 /// Applies the nodes of a scene: one mesh in world space. Mirrored instances are turned round; normals go by the inverse transpose.
+/// A scene read from glTF has its texture coordinates turned over.
 pub(crate) fn flatten<'a>(scene: &'a Scene, format: &str) -> Flat<'a> {
+    let mut flat = place(scene, format);
+    let is_uv = |c: &Channel| matches!(c.semantic, Semantic::TexCoord(_));
+    if scene.gltf.is_some()
+        && flat.geometry.wedges.as_ref().is_some_and(|w| w.channels().iter().any(is_uv))
+        && let Some(w) = &mut flat.geometry.to_mut().wedges
+    {
+        turn_v_over(w);
+    }
+    flat
+}
+
+fn place<'a>(scene: &'a Scene, format: &str) -> Flat<'a> {
     let instances = instances(scene);
     let mut warnings = Vec::new();
     let mut shown = vec![0usize; scene.meshes.len()];

@@ -3,8 +3,9 @@
 use super::encode::Writer;
 use super::geometry::{self, Shape};
 use super::{images, semantic};
-use crate::aif::{Positions, Semantic};
+use crate::aif::Positions;
 use crate::io::EncodeError;
+use crate::io::flatten::turn_v_over;
 use crate::scene::{Material, Node, Scene, SceneMesh};
 use glam::{DMat4, DVec3};
 use serde_json::{Map, Value, json};
@@ -95,18 +96,7 @@ fn drop_empty(node: &mut Value) {
 fn prepare(mesh: &SceneMesh, writer: &mut Writer) -> (SceneMesh, DVec3) {
     let mut mesh = mesh.clone();
     if let Some(w) = &mut mesh.geometry.wedges {
-        let uv: Vec<usize> = (0..w.channels().len())
-            .filter(|&k| {
-                matches!(w.channels()[k].semantic, Semantic::TexCoord(_)) && w.channels()[k].width >= 2
-            })
-            .map(|k| w.offset(k) + 1)
-            .collect();
-        for i in 0..w.len() as u32 {
-            for &v in &uv {
-                let row = w.row_mut(i);
-                row[v] = 1.0 - row[v];
-            }
-        }
+        turn_v_over(w);
         for c in w.channels() {
             let allowed = semantic::widths(&c.semantic);
             if allowed.is_some_and(|a| !a.contains(&c.width)) {
