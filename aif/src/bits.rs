@@ -40,6 +40,14 @@ impl Bits {
         }
     }
 
+    /// Clears all bits. O(n / 64), and O(1) when none is set.
+    pub fn clear_all(&mut self) {
+        if self.ones > 0 {
+            self.words.fill(0);
+            self.ones = 0;
+        }
+    }
+
     /// Number of set bits. O(1).
     pub fn count(&self) -> usize {
         self.ones

@@ -7,7 +7,7 @@ use crate::validity::{MAX_VALENCE, RingFace, gather_ring};
 use crate::wedges::WedgeMerge;
 use crate::work::{Kind, Roles, Work};
 use glam::DVec3;
-use progmesh_aif::{EdgeId, VertexId};
+use progmesh_aif::{EdgeId, Marks, VertexId};
 
 /// Weight of the plane that stands on a border edge, times the edge's squared length. Decided on rangemap, bunny and dragon at 1 %:
 /// at 100 borders starve the surface (rangemap rms + 80 %), at 0.1 they drift.
@@ -44,13 +44,22 @@ pub(crate) struct Collapser<'m> {
     pub(crate) bound: f64,
     pub(crate) tried: u64,
     pub(crate) refused: Refused,
+    /// Edges that the kinds of their vertices forbid, as last counted.
+    pub(crate) locked_edges: u64,
     wedges: WedgeMerge,
-    /// Scratch: the faces around a candidate.
+    scratch: Scratch,
+}
+
+/// What [`Collapser::check`] works with, one for each thread.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scratch {
+    marks: Marks,
     ring: Vec<RingFace>,
 }
 
 /// Why a candidate is refused.
-enum Refusal {
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Refusal {
     Link,
     Border,
     Flip,
@@ -75,8 +84,9 @@ impl<'m> Collapser<'m> {
             bound,
             tried: 0,
             refused: Refused::default(),
+            locked_edges: 0,
             wedges,
-            ring: Vec::new(),
+            scratch: Scratch::default(),
         }
     }
 
@@ -120,8 +130,16 @@ impl<'m> Collapser<'m> {
 
     /// Collapses the candidate if topology and geometry allow it. O(valence).
     pub(crate) fn attempt(&mut self, e: EdgeId, c: &Candidate) -> bool {
+        let mut scratch = std::mem::take(&mut self.scratch);
+        let verdict = self.check(e, c, &mut scratch);
+        self.scratch = scratch;
+        self.follow(e, c, verdict)
+    }
+
+    /// Does what a fresh [`Collapser::check`] found, and counts it.
+    pub(crate) fn follow(&mut self, e: EdgeId, c: &Candidate, verdict: Result<DVec3, Refusal>) -> bool {
         self.tried += 1;
-        let refusal = match self.check(e, c) {
+        let refusal = match verdict {
             Ok(to) => {
                 self.collapse(e, c, to);
                 return true;
@@ -137,10 +155,11 @@ impl<'m> Collapser<'m> {
         false
     }
 
-    /// Where the kept vertex goes if the collapse is allowed.
-    fn check(&mut self, e: EdgeId, c: &Candidate) -> Result<DVec3, Refusal> {
+    /// Where the kept vertex goes if the collapse is allowed. Reads the one-rings of both vertices. O(valence).
+    pub(crate) fn check(&self, e: EdgeId, c: &Candidate, scratch: &mut Scratch) -> Result<DVec3, Refusal> {
         let Roles { kept, removed, fixed } = c.roles;
-        let work = &mut self.work;
+        let work = &self.work;
+        let Scratch { marks, ring } = scratch;
         let t = work.mesh.topology();
         // Two edges fall together with two others, and the collapsed one goes: a hub may shrink, not grow.
         let (vk, vr) = (t.star(kept).len(), t.star(removed).len());
@@ -150,14 +169,14 @@ impl<'m> Collapser<'m> {
         if work.pinches_seam(e) {
             return Err(Refusal::Border);
         }
-        if t.link_condition_of_regular(e, kept, &mut work.marks).is_err() {
+        if t.link_condition_of_regular(e, kept, marks).is_err() {
             return Err(Refusal::Link);
         }
         let (gone, points) = (t.edge_faces(e), &work.points);
-        self.ring.clear();
-        gather_ring(t, points, removed, gone, &mut self.ring);
-        let of_removed = self.ring.len();
-        gather_ring(t, points, kept, gone, &mut self.ring);
+        ring.clear();
+        gather_ring(t, points, removed, gone, ring);
+        let of_removed = ring.len();
+        gather_ring(t, points, kept, gone, ring);
         let mut to = c.to;
         let inner = |v: VertexId| work.kinds[v.index()] == Kind::Interior;
         if self.placement == Placement::Optimal && !fixed && inner(kept) && inner(removed) {
@@ -166,10 +185,10 @@ impl<'m> Collapser<'m> {
             let q = self.quadrics[kept.index()]
                 .plus(&self.quadrics[removed.index()].moved(origin - points[removed.index()]));
             let reach = VOLUME_REACH * origin.distance(points[removed.index()]);
-            to += volume_correction(&q, &self.ring, wings, origin, to, reach);
+            to += volume_correction(&q, ring, wings, origin, to, reach);
         }
         // A kept vertex that does not move changes none of its own faces.
-        let moving = if to == points[kept.index()] { &self.ring[..of_removed] } else { &self.ring[..] };
+        let moving = if to == points[kept.index()] { &ring[..of_removed] } else { &ring[..] };
         if !moving.iter().all(|f| f.stays_good(to)) {
             return Err(Refusal::Flip);
         }

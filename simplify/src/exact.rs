@@ -10,8 +10,10 @@ use progmesh_aif::{Bits, EdgeId};
 
 /// What to stop at.
 pub(crate) struct Goal {
-    /// Triangles over all meshes.
+    /// Triangles wanted over all meshes.
     pub(crate) triangles: usize,
+    /// Triangles there were at first.
+    pub(crate) first: usize,
 }
 
 /// Edges of several meshes under one numbering.
@@ -53,6 +55,29 @@ fn key(cost: f64, n: u32) -> u64 {
     (((cost as f32).to_bits() as u64) << 32) | n as u64
 }
 
+/// How far the work has come.
+pub(crate) struct Progress<'c> {
+    /// Triangles left over all meshes.
+    pub(crate) left: usize,
+    /// Triangles wanted.
+    pub(crate) goal: usize,
+    first: usize,
+    control: &'c dyn Control,
+}
+
+impl<'c> Progress<'c> {
+    pub(crate) fn new(meshes: &[Collapser<'_>], goal: &Goal, control: &'c dyn Control) -> Self {
+        let left = meshes.iter().map(|m| m.work.triangles).sum();
+        Progress { left, goal: goal.triangles, first: goal.first, control }
+    }
+
+    /// Tells the caller.
+    pub(crate) fn report(&self) {
+        let whole = self.first.saturating_sub(self.goal).max(1);
+        self.control.progress((self.first - self.left) as f64 / whole as f64);
+    }
+}
+
 /// Runs until the goal is met. `factors[i]` turns costs of mesh `i` into common ones.
 pub(crate) fn run(
     meshes: &mut [Collapser<'_>],
@@ -61,29 +86,45 @@ pub(crate) fn run(
     control: &dyn Control,
 ) -> Stop {
     let numbering = Numbering::new(meshes);
-    let mut left: usize = meshes.iter().map(|m| m.work.triangles).sum();
-    let first = left;
+    let mut progress = Progress::new(meshes, goal, control);
+    if progress.left <= goal.triangles {
+        return Stop::Target;
+    }
     let mut heap = RadixHeap::new();
     for (i, m) in meshes.iter_mut().enumerate() {
-        let edges: Vec<EdgeId> = m.work.mesh.topology().edges().collect();
-        for e in edges {
+        for e in m.work.mesh.topology().edges() {
             match m.evaluate(e) {
                 Some(c) => heap.push(key(c.cost * factors[i], numbering.number(i, e))),
-                None => m.refused.locked += 1,
+                None => m.locked_edges += 1,
             }
         }
     }
-    // Edges refused where they stood: they get another chance when their surroundings change.
+    // Edges refused where they stood: they get another chance when their surroundings change, and one more at the end.
     let mut waiting: Vec<Bits> = meshes.iter().map(|m| Bits::new(m.work.mesh.topology().edge_slots())).collect();
     let mut bounded = false;
-    let mut rounds = 0u32;
-    while left > goal.triangles {
+    let mut steps = 0u32;
+    let mut left_at_end = usize::MAX;
+    while progress.left > goal.triangles {
         let Some(top) = heap.pop() else {
-            break;
+            // Once more with all that was refused, as long as that still finds something.
+            if progress.left == left_at_end {
+                break;
+            }
+            left_at_end = progress.left;
+            heap = RadixHeap::new();
+            for (i, m) in meshes.iter().enumerate() {
+                for e in m.work.mesh.topology().edges().filter(|e| waiting[i].get(e.index())) {
+                    if let Some(c) = m.evaluate(e) {
+                        heap.push(key(c.cost * factors[i], numbering.number(i, e)));
+                    }
+                }
+                waiting[i].clear_all();
+            }
+            continue;
         };
-        rounds = rounds.wrapping_add(1);
-        if rounds & 0x3ff == 0 {
-            control.progress((first - left) as f64 / (first - goal.triangles) as f64);
+        steps = steps.wrapping_add(1);
+        if steps & 0x3ff == 0 {
+            progress.report();
             if control.cancelled() {
                 return Stop::Cancelled;
             }
@@ -105,7 +146,7 @@ pub(crate) fn run(
         }
         let before = m.work.triangles;
         if m.attempt(e, &c) {
-            left -= before - m.work.triangles;
+            progress.left -= before - m.work.triangles;
             for &x in m.work.mesh.topology().star(c.roles.kept) {
                 if waiting[i].get(x.index()) {
                     waiting[i].clear(x.index());
@@ -119,7 +160,7 @@ pub(crate) fn run(
         }
     }
     match () {
-        _ if left <= goal.triangles => Stop::Target,
+        _ if progress.left <= goal.triangles => Stop::Target,
         _ if bounded => Stop::Error,
         _ => Stop::NoLegalCollapse,
     }

@@ -8,9 +8,11 @@
 //! work; the result does not depend on the number of threads. Not guaranteed: freedom from self-intersections; that an estimated error
 //! ([`Outcome::estimate`]) bounds the true one; topology under clustering.
 
+mod bulk;
 mod collapser;
 mod exact;
 mod options;
+mod parallel;
 mod quadric;
 mod radix_heap;
 mod validity;
@@ -51,7 +53,11 @@ pub fn simplify_all(
     let largest = collapsers.iter().zip(scales).map(|(c, s)| c.work.diagonal * s).fold(0.0, f64::max);
     let factors: Vec<f64> = world.iter().map(|w| (w / largest).powi(4)).collect();
     let triangles = options.triangles.unwrap_or(0).max(options.ratio.map_or(0, |r| (r * total as f64).round() as usize));
-    let stop = exact::run(&mut collapsers, &factors, &exact::Goal { triangles }, control);
+    let goal = exact::Goal { triangles, first: total };
+    let stop = match options.schedule {
+        Some(Schedule::Exact) => exact::run(&mut collapsers, &factors, &goal, control),
+        _ => parallel::with_threads(options.threads, || bulk::run(&mut collapsers, &factors, &goal, control)),
+    };
     let mut outcomes = Vec::new();
     for (mut c, b) in collapsers.into_iter().zip(before) {
         c.work.write_back();

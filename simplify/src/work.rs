@@ -2,7 +2,7 @@
 
 use crate::options::{MaxError, Options, SimplifyError};
 use glam::DVec3;
-use progmesh_aif::{Bits, EdgeId, FaceId, Marks, Mesh, NONE, VertexId};
+use progmesh_aif::{Bits, EdgeId, FaceId, Mesh, NONE, VertexId};
 
 /// What a vertex may do.
 ///
@@ -39,7 +39,6 @@ pub(crate) struct Work<'m> {
     pub(crate) seams: Bits,
     /// Vertices whose position is no longer the input's.
     pub(crate) moved: Bits,
-    pub(crate) marks: Marks,
     /// Triangles left (a polygon of n corners counts n - 2).
     pub(crate) triangles: usize,
 }
@@ -77,7 +76,6 @@ impl<'m> Work<'m> {
             kinds: Vec::new(),
             seams,
             moved: Bits::new(slots),
-            marks: Marks::default(),
             triangles,
             mesh,
         };
