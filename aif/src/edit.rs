@@ -454,6 +454,14 @@ impl Mesh {
     ) -> Result<Collapse, LinkViolation> {
         self.topology.link_condition(e, kept, marks)?;
         let old_position = self.position(kept);
+        let record = self.collapse_unchecked(e, kept);
+        self.positions.set(kept.index(), to);
+        Ok(Collapse { record, old_position })
+    }
+
+    /// Collapses edge `e` onto its vertex `kept`, which stays where it is. The caller has checked [`Topology::link_condition`].
+    /// Corners of surviving faces keep their wedges. O(valence).
+    pub fn collapse_unchecked(&mut self, e: EdgeId, kept: VertexId) -> CollapseRecord {
         let record = self.topology.collapse(e, kept);
         if let Some(w) = &mut self.wedges {
             for wing in record.wings().filter(|w| w.removed_edge == e) {
@@ -462,8 +470,7 @@ impl Mesh {
                 w.corner[range.start + wing.slot as usize..=range.end].rotate_left(1);
             }
         }
-        self.positions.set(kept.index(), to);
-        Ok(Collapse { record, old_position })
+        record
     }
 
     /// Undoes a collapse exactly: ids, the order of every list, positions, corners. It must be the last that has not been undone.

@@ -11,6 +11,8 @@
 mod bulk;
 mod collapser;
 mod exact;
+mod finish;
+pub mod nsa;
 mod options;
 mod parallel;
 mod quadric;
@@ -18,11 +20,7 @@ mod radix_heap;
 mod validity;
 mod wedges;
 mod work;
-pub mod nsa {
-    //! NSA.
-    /// Default epsilon.
-    pub const DEFAULT_EPSILON: f64 = 12.0;
-}
+
 pub use options::*;
 
 use collapser::Collapser;
@@ -45,6 +43,9 @@ pub fn simplify_all(
     let before: Vec<_> =
         meshes.iter().map(|m| (m.face_count(), m.triangle_count(), m.topology().relation_bytes())).collect();
     let total: usize = before.iter().map(|b| b.1).sum();
+    if options.method == Method::Nsa {
+        return nsa::simplify_all(meshes, options, control);
+    }
     let mut collapsers = Vec::new();
     for m in meshes.iter_mut() {
         collapsers.push(Collapser::new(Work::new(m, options)?, options));

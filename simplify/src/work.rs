@@ -163,6 +163,18 @@ impl<'m> Work<'m> {
             })
     }
 
+    /// A local point in model units, rounded to the precision of the mesh.
+    #[inline]
+    pub(crate) fn to_model(&self, p: DVec3) -> DVec3 {
+        self.mesh.positions().round(p / self.scale + self.centre)
+    }
+
+    /// A point in model units as a local one.
+    #[inline]
+    pub(crate) fn to_local(&self, p: DVec3) -> DVec3 {
+        (p - self.centre) * self.scale
+    }
+
     /// Writes moved positions back to the mesh, in its precision.
     pub(crate) fn write_back(&mut self) {
         for v in 0..self.points.len() {
