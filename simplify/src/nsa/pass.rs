@@ -8,7 +8,7 @@ use crate::validity::{MAX_VALENCE, RingFace, gather_ring};
 use crate::wedges::WedgeMerge;
 use crate::work::{Roles, Work, wedge_at};
 use glam::DVec3;
-use progmesh_aif::{Bits, Collapse, EdgeId, FaceId, Mesh, NONE, VertexId};
+use progmesh_aif::{Bits, Collapse, EdgeId, FaceId, Marks, Mesh, NONE, VertexId};
 
 /// Optimal placement: pull towards the middle of the edge, relative to the mean eigenvalue of the quadric.
 const PULL: f64 = 1e-6;
@@ -38,6 +38,7 @@ pub(super) struct Engine<'m> {
 /// Reused from edge to edge.
 #[derive(Default)]
 struct Scratch {
+    marks: Marks,
     /// Of triangle meshes: the faces around both ends that survive; those of the removed vertex first.
     ring: Vec<RingFace>,
     /// Of other meshes: the same, as ids.
@@ -167,7 +168,7 @@ impl<'m> Engine<'m> {
         self.gather(e, &roles);
         let (roles, to) = self.place(e, roles).ok_or(Refusal::Normal)?;
         let t = self.work.mesh.topology();
-        if t.link_condition_of_regular(e, roles.kept, &mut self.work.marks).is_err() {
+        if t.link_condition_of_regular(e, roles.kept, &mut self.scratch.marks).is_err() {
             return Err(Refusal::Link);
         }
         let error = self.error_at(e, &roles, to);
