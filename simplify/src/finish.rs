@@ -3,6 +3,12 @@
 use crate::options::{Level, Options, Outcome, Stop};
 use progmesh_aif::{BuildOptions, CompactOptions, Mesh, NONE};
 
+/// The triangles at which to stop, of `total`: the first target that is reached, so the larger; 0 without one.
+pub(crate) fn target(options: &Options, total: usize) -> usize {
+    let by_ratio = options.ratio.map(|r| (r * total as f64).round() as usize);
+    options.triangles.into_iter().chain(by_ratio).max().unwrap_or(0)
+}
+
 /// What is to be known of a mesh before it is simplified.
 pub(crate) struct Before {
     faces: usize,

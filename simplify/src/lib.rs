@@ -9,9 +9,11 @@
 //! ([`Outcome::estimate`]) bounds the true one; topology under clustering.
 
 mod bulk;
+mod cluster;
 mod collapser;
 mod exact;
 mod finish;
+mod locks;
 pub mod nsa;
 mod options;
 mod parallel;
@@ -45,6 +47,9 @@ pub fn simplify_all(
     let total: usize = before.iter().map(|b| b.1).sum();
     if options.method == Method::Nsa {
         return nsa::simplify_all(meshes, options, control);
+    }
+    if options.method == Method::Cluster {
+        return cluster::simplify_all(meshes, scales, options, control);
     }
     let mut collapsers = Vec::new();
     for m in meshes.iter_mut() {

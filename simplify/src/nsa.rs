@@ -15,7 +15,7 @@
 mod pass;
 mod turn;
 
-use crate::finish::{Before, finish};
+use crate::finish::{Before, finish, target};
 use crate::options::{Control, Level, Options, Outcome, SimplifyError, Stop};
 use pass::Engine;
 use progmesh_aif::{Collapse, Mesh};
@@ -94,12 +94,6 @@ pub(crate) fn simplify_all(
     let (stop, done) = run_all(meshes, options, target, None, control)?;
     let each = meshes.iter_mut().zip(&before).zip(done);
     Ok(each.map(|((m, b), (levels, estimate))| finish(m, b, options, (stop, estimate, levels))).collect())
-}
-
-/// The triangles at which to stop, of `total`: the first target that is reached, so the larger.
-fn target(options: &Options, total: usize) -> usize {
-    let by_ratio = options.ratio.map(|r| (r * total as f64).round() as usize);
-    options.triangles.into_iter().chain(by_ratio).max().unwrap_or(0)
 }
 
 /// The levels of a mesh, and its estimated error.

@@ -48,7 +48,7 @@ i---j---k---l",
     assert_eq!((m.vertex_count(), m.face_count()), (10, 8), "the ten on the border are left");
     let up = |f| m.face_normal(f).z;
     assert!(m.topology().faces().all(|f| up(f) > 0.0));
-    assert_eq!(m.topology().faces().map(up).sum::<f64>(), 2.0 * 12.0 * 4.0);
+    assert_eq!(m.topology().faces().map(up).sum::<f64>(), 2.0 * 12.0 * 8.0);
 }
 
 #[test]

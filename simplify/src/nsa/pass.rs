@@ -2,6 +2,7 @@
 
 use super::turn::{MaxTurn, newell};
 use super::{Recorder, Step};
+use crate::locks::locked_vertices;
 use crate::options::{Options, Placement, Refused, SimplifyError};
 use crate::quadric::Quadric;
 use crate::validity::{MAX_VALENCE, RingFace, gather_ring};
@@ -73,7 +74,7 @@ impl<'m> Engine<'m> {
             false => own.placement.unwrap_or(Placement::Midpoint),
         };
         Ok(Engine {
-            locked: locked(&work, options),
+            locked: locked_vertices(work.mesh, options),
             placement,
             turn: MaxTurn::new(epsilon),
             wedges: None,
@@ -364,19 +365,4 @@ impl<'m> Engine<'m> {
             }
         }
     }
-}
-
-/// The vertices that the caller locked.
-fn locked(work: &Work<'_>, options: &Options) -> Bits {
-    let mut locked = options.locked_vertices.clone();
-    if !(options.locked_materials.is_empty() && options.locked_groups.is_empty()) {
-        let (mesh, t) = (&*work.mesh, work.mesh.topology());
-        let of = |x: Option<u32>, list: &[u32]| x.is_some_and(|x| list.contains(&x));
-        for f in t.faces() {
-            if of(mesh.material(f), &options.locked_materials) || of(mesh.group(f), &options.locked_groups) {
-                t.face_vertices(f).for_each(|v| locked.set(v.index()));
-            }
-        }
-    }
-    locked
 }

@@ -67,13 +67,13 @@ pub(crate) fn border(m: &Mesh) -> Vec<Vec<[u64; 3]>> {
     loops
 }
 
-/// A mesh drawn in text: letters are vertices, at their column and row (rows go down); faces name them counter-clockwise.
+/// A mesh drawn in text: letters are vertices, at their column and twice their row (rows go down); faces name them counter-clockwise.
 pub(crate) fn drawn(art: &str, faces: &str) -> (Mesh, Vec<char>) {
     let (mut names, mut points) = (Vec::new(), Vec::new());
     for (y, line) in art.lines().enumerate() {
         for (x, c) in line.chars().enumerate().filter(|c| c.1.is_alphabetic()) {
             names.push(c);
-            points.push([x as f32, -(y as f32), 0.0]);
+            points.push([x as f32, -2.0 * y as f32, 0.0]);
         }
     }
     let faces: Vec<&str> = faces.split_whitespace().collect();
