@@ -314,8 +314,15 @@ impl Args {
         ];
         match reasons.iter().max_by_key(|r| r.0).filter(|r| r.0 > 0) {
             Some((_, advice)) => format!("Mostly {advice}"),
+            // A batch need not look at what is locked at all.
+            None if self.locks() => "What is left is locked: lock less".into(),
             None => "Try --weld, --prune or --method cluster".into(),
         }
+    }
+
+    fn locks(&self) -> bool {
+        let named = !self.lock_material.is_empty() || !self.lock_group.is_empty();
+        named || self.lock_border || self.lock_property.is_some()
     }
 
     fn report(&self, s: &Summary, seconds: Seconds, warnings: Vec<String>) -> Result<String, Failure> {
