@@ -52,7 +52,13 @@ pub(crate) fn simplify_all(
     let has_target = options.triangles.is_some() || options.ratio.is_some();
     let mut stop = Stop::Target;
     if total > target {
-        let mut count = |n: u32| sources.iter_mut().map(|s| s.count(extent / n as f64)).sum::<usize>();
+        let mut count = |n: u32| {
+            let mut sum = 0;
+            for s in &mut sources {
+                sum += s.count(extent / n as f64, target.saturating_sub(sum));
+            }
+            sum
+        };
         let by_target =
             if has_target || bounded.is_none() { search(target, &mut count, control) } else { None };
         // The first of the two that is reached, coming from the fine side: the finer.

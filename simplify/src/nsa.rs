@@ -23,7 +23,9 @@ use std::time::Instant;
 
 /// Epsilon when none is given, degrees.
 ///
-/// Decided on horse, bunny, igea and dragon over five passes.
+/// Decided on horse, bunny, igea and fandisk at 50, 10 and 4 % of the faces, among 8, 12, 16, 20, 30 and 60: a smaller angle gives a
+/// smaller rms at the same count as long as it reaches the count. At 4 % the best is 12; 8 stops at 5 to 6 % on horse and bunny, and
+/// from 16 on the rms grows everywhere.
 pub const DEFAULT_EPSILON: f64 = 12.0;
 
 /// One collapse, with all that is needed to undo it and do it again.

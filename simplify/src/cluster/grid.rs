@@ -141,14 +141,17 @@ impl<'m> Source<'m> {
         (low.min(p), (low + DVec3::splat(edge)).max(p))
     }
 
-    /// The triangles that cells of this edge would leave. O(n), O(k log k) in those left.
-    pub(super) fn count(&mut self, edge: f64) -> usize {
+    /// The triangles that cells of this edge would leave; equal ones may count twice if all together are at most `enough`.
+    /// O(n), O(k log k) in those left.
+    pub(super) fn count(&mut self, edge: f64, enough: usize) -> usize {
         self.assign(edge);
         let Source { left, triangles, vertex, cell, .. } = self;
         left.clear();
         left.extend(triangles.iter().filter_map(|t| canonical(t.map(|c| cell[vertex[c as usize] as usize]))));
-        left.sort_unstable();
-        left.dedup();
+        if left.len() > enough {
+            left.sort_unstable();
+            left.dedup();
+        }
         left.len()
     }
 }

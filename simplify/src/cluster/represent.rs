@@ -153,15 +153,15 @@ impl Source<'_> {
 
     /// The triangles that are left: their numbers, and their cells.
     fn surviving(&self) -> (Vec<u32>, Vec<[u32; 3]>) {
-        let mut seen = HashSet::new();
-        let (mut kept, mut cells) = (Vec::new(), Vec::new());
-        for (i, t) in self.triangles.iter().enumerate() {
-            let t = t.map(|c| self.cell[self.vertex[c as usize] as usize]);
-            if canonical(t).is_some_and(|c| seen.insert(c)) {
-                kept.push(i as u32);
-                cells.push(t);
-            }
-        }
+        let cells = |i: usize| self.triangles[i].map(|c| self.cell[self.vertex[c as usize] as usize]);
+        let named = |i: usize| canonical(cells(i)).map(|t| (t, i as u32));
+        let mut left: Vec<([u32; 3], u32)> = (0..self.triangles.len()).filter_map(named).collect();
+        // Equal ones side by side, the first of them first.
+        left.sort_unstable();
+        left.dedup_by_key(|l| l.0);
+        let mut kept: Vec<u32> = left.into_iter().map(|l| l.1).collect();
+        kept.sort_unstable();
+        let cells = kept.iter().map(|&i| cells(i as usize)).collect();
         (kept, cells)
     }
 
