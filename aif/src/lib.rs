@@ -27,6 +27,7 @@ mod error;
 mod ids;
 mod mesh;
 pub mod positions;
+mod remove;
 mod sets;
 mod topology;
 mod traverse;

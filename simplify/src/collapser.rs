@@ -185,7 +185,13 @@ impl<'m> Collapser<'m> {
             let q = self.quadrics[kept.index()]
                 .plus(&self.quadrics[removed.index()].moved(origin - points[removed.index()]));
             let reach = VOLUME_REACH * origin.distance(points[removed.index()]);
-            to += volume_correction(&q, ring, wings, origin, to, reach);
+            let corrected = to + volume_correction(&q, ring, wings, origin, to, reach);
+            if q.at(corrected - origin) <= self.bound * q.weight {
+                to = corrected;
+            }
+        }
+        if !fixed && self.placement != Placement::Endpoint {
+            to = work.round(to);
         }
         // A kept vertex that does not move changes none of its own faces.
         let moving = if to == points[kept.index()] { &ring[..of_removed] } else { &ring[..] };

@@ -18,6 +18,7 @@ pub mod nsa;
 mod options;
 mod parallel;
 mod quadric;
+mod quadric_collapse;
 mod radix_heap;
 mod validity;
 mod wedges;
@@ -25,64 +26,67 @@ mod work;
 
 pub use options::*;
 
-use collapser::Collapser;
 use progmesh_aif::Mesh;
-use work::Work;
 
-/// Simplifies `mesh` in place; the result is compact.
+/// Simplifies `mesh` in place; the result is compact, without isolated vertices (unless all vertices are kept).
+///
+/// Errors: an option out of its range; the mesh is as it was then. O(n log n) for collapses, O(n) a search step for clustering.
+///
+/// ```
+/// use progmesh_aif::Mesh;
+/// use progmesh_simplify::{Options, Quiet, Stop, simplify};
+/// // A flat 3 x 3 grid of vertices; only its corners are needed.
+/// let points: Vec<[f32; 3]> = (0..9).map(|i| [(i % 3) as f32, (i / 3) as f32, 0.0]).collect();
+/// let quads = [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]];
+/// let mut mesh = Mesh::from_polygons(points, &[4; 4], quads.as_flattened())?;
+/// let mut options = Options::default();
+/// options.triangles = Some(2);
+/// let outcome = simplify(&mut mesh, &options, &Quiet)?;
+/// assert_eq!((outcome.stop, mesh.face_count(), mesh.vertex_count()), (Stop::Target, 2, 4));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn simplify(mesh: &mut Mesh, options: &Options, control: &dyn Control) -> Result<Outcome, SimplifyError> {
-    let mut out = simplify_all(std::slice::from_mut(mesh), &[1.0], options, control)?;
-    Ok(out.remove(0))
+    let mut outcomes = simplify_all(std::slice::from_mut(mesh), &[1.0], options, control)?;
+    Ok(outcomes.swap_remove(0))
 }
 
 /// Simplifies several meshes to one shared target: errors of mesh `i` weigh `scales[i]` (model units to world units).
+///
+/// Options by vertex (locks, weights) are those of every mesh: give them for one mesh at a time. Panics if `scales` has another length
+/// than `meshes`.
 pub fn simplify_all(
     meshes: &mut [Mesh],
     scales: &[f64],
     options: &Options,
     control: &dyn Control,
 ) -> Result<Vec<Outcome>, SimplifyError> {
-    let before: Vec<_> =
-        meshes.iter().map(|m| (m.face_count(), m.triangle_count(), m.topology().relation_bytes())).collect();
-    let total: usize = before.iter().map(|b| b.1).sum();
-    if options.method == Method::Nsa {
-        return nsa::simplify_all(meshes, options, control);
+    assert_eq!(meshes.len(), scales.len(), "one scale for each mesh");
+    validate(options)?;
+    let total: usize = meshes.iter().map(Mesh::triangle_count).sum();
+    let mut options = std::borrow::Cow::Borrowed(options);
+    if let Some(fraction) = options.prune {
+        meshes.iter_mut().for_each(|m| quadric_collapse::prune_components(m, fraction));
+        if options.ratio.is_some() {
+            let o = options.to_mut();
+            o.triangles = Some(finish::target(o, total));
+            o.ratio = None;
+        }
     }
-    if options.method == Method::Cluster {
-        return cluster::simplify_all(meshes, scales, options, control);
+    match options.method {
+        Method::Nsa => nsa::simplify_all(meshes, &options, control),
+        Method::Quadric => quadric_collapse::simplify_all(meshes, scales, &options, control),
+        Method::Cluster => cluster::simplify_all(meshes, scales, &options, control),
     }
-    let mut collapsers = Vec::new();
-    for m in meshes.iter_mut() {
-        collapsers.push(Collapser::new(Work::new(m, options)?, options));
-    }
-    let world: Vec<f64> = collapsers.iter().zip(scales).map(|(c, s)| s / c.work.scale).collect();
-    let largest = collapsers.iter().zip(scales).map(|(c, s)| c.work.diagonal * s).fold(0.0, f64::max);
-    let factors: Vec<f64> = world.iter().map(|w| (w / largest).powi(4)).collect();
-    let triangles = options.triangles.unwrap_or(0).max(options.ratio.map_or(0, |r| (r * total as f64).round() as usize));
-    let goal = exact::Goal { triangles, first: total };
-    let stop = match options.schedule {
-        Some(Schedule::Exact) => exact::run(&mut collapsers, &factors, &goal, control),
-        _ => parallel::with_threads(options.threads, || bulk::run(&mut collapsers, &factors, &goal, control)),
+}
+
+/// Refuses options out of their range.
+fn validate(options: &Options) -> Result<(), SimplifyError> {
+    let within = |option, value: Option<f64>, upper: f64, range| match value {
+        Some(v) if !(0.0..=upper).contains(&v) => Err(SimplifyError::Range { option, value: v, range }),
+        _ => Ok(()),
     };
-    let mut outcomes = Vec::new();
-    for (mut c, b) in collapsers.into_iter().zip(before) {
-        c.work.write_back();
-        let estimate = c.estimate();
-        let level = Level { pass: 1, faces: c.work.triangles, seconds: 0.0, tried: c.tried, refused: c.refused };
-        let m = c.work.mesh;
-        outcomes.push(Outcome {
-            faces_in: b.0,
-            faces_out: m.face_count(),
-            triangles_out: m.triangle_count(),
-            vertices_out: m.vertex_count(),
-            stop,
-            estimate,
-            levels: vec![level],
-            triangulated: 0,
-            isolated_removed: 0,
-            aif_bytes: b.2,
-            vertex_origin: vec![],
-        });
-    }
-    Ok(outcomes)
+    within("ratio", options.ratio, 1.0, "0 to 1")?;
+    within("prune", options.prune, 1.0, "0 to 1")?;
+    within("max_error", options.max_error.map(|b| b.value), f64::MAX, "finite and not negative")?;
+    within("epsilon", options.epsilon, 180.0, "0 to 180 degrees")
 }

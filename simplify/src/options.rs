@@ -78,7 +78,7 @@ pub struct Options {
     pub locked_groups: Vec<u32>,
     /// Importance of every vertex slot, positive, 1 = normal: errors there weigh that much more. Empty for all 1.
     pub vertex_weights: Vec<f32>,
-    /// Remove components whose bounding-box diagonal is below this fraction of the mesh's, once nothing else is legal.
+    /// First remove components whose bounding-box diagonal is below this fraction of the mesh's, 0..=1. Targets count what the input had.
     pub prune: Option<f64>,
     /// Threads to use; `None` for all of the current rayon pool. The result does not depend on it.
     pub threads: Option<usize>,
@@ -143,7 +143,7 @@ impl Refused {
     }
 }
 
-/// One pass (NSA), batch (bulk), or the whole run (exact, cluster).
+/// One pass (NSA), or the whole run.
 #[derive(Clone, Copy, Debug, Default)]
 #[non_exhaustive]
 pub struct Level {
@@ -202,6 +202,9 @@ pub enum SimplifyError {
         /// What it may be.
         range: &'static str,
     },
+    /// Polygons make more triangles than ids can name. Split the mesh.
+    #[error("cutting polygons into triangles: {0}")]
+    TooLarge(#[from] progmesh_aif::BuildError),
     /// An array that runs parallel to the vertices has another length.
     #[error("{option} has {len} entries, the mesh has {want} vertices")]
     Length {

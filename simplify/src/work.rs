@@ -1,8 +1,9 @@
 //! The working state of one mesh: positions in a local frame, what may move, what may go.
 
+use crate::locks::locked_vertices;
 use crate::options::{MaxError, Options, SimplifyError};
 use glam::DVec3;
-use progmesh_aif::{Bits, EdgeId, FaceId, Mesh, NONE, VertexId};
+use progmesh_aif::{Bits, EdgeId, FaceId, Mesh, NONE, Positions, VertexId};
 
 /// What a vertex may do.
 ///
@@ -93,6 +94,7 @@ impl<'m> Work<'m> {
     fn classify(&self, options: &Options) -> Vec<Kind> {
         let t = self.mesh.topology();
         let mut kinds = vec![Kind::Interior; t.vertex_slots()];
+        let locked = locked_vertices(self.mesh, options);
         for v in t.vertices() {
             let (mut borders, mut seams, mut odd) = (0, 0, false);
             for &e in t.star(v) {
@@ -110,18 +112,8 @@ impl<'m> Work<'m> {
                 (2, 0) => Kind::Border,
                 _ => Kind::Pinned,
             };
-            if options.locked_vertices.get(v.index()) {
+            if locked.get(v.index()) {
                 kinds[v.index()] = Kind::Pinned;
-            }
-        }
-        if !(options.locked_materials.is_empty() && options.locked_groups.is_empty()) {
-            for f in t.faces() {
-                let locked = |of: Option<u32>, list: &[u32]| of.is_some_and(|x| list.contains(&x));
-                if locked(self.mesh.material(f), &options.locked_materials)
-                    || locked(self.mesh.group(f), &options.locked_groups)
-                {
-                    t.face_vertices(f).for_each(|v| kinds[v.index()] = Kind::Pinned);
-                }
             }
         }
         kinds
@@ -173,6 +165,19 @@ impl<'m> Work<'m> {
     #[inline]
     pub(crate) fn to_local(&self, p: DVec3) -> DVec3 {
         (p - self.centre) * self.scale
+    }
+
+    /// `p` as it will read back after it was written to the mesh, so that what is tested is what results. Exact for f32 meshes; for f64
+    /// ones the rounding is far below anything tested.
+    #[inline]
+    pub(crate) fn round(&self, p: DVec3) -> DVec3 {
+        match self.mesh.positions() {
+            Positions::F32(_) => {
+                let q = self.mesh.positions().round(p / self.scale + self.centre);
+                (q - self.centre) * self.scale
+            }
+            Positions::F64(_) => p,
+        }
     }
 
     /// Writes moved positions back to the mesh, in its precision.

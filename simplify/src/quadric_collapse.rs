@@ -1,0 +1,92 @@
+//! The quadric method on several meshes: one target, shared by world-space error.
+
+use crate::collapser::Collapser;
+use crate::finish::{Before, finish, target};
+use crate::options::{Control, Level, Options, Outcome, Schedule, SimplifyError};
+use crate::parallel::with_threads;
+use crate::work::Work;
+use crate::{bulk, exact};
+use progmesh_aif::{Bits, Mesh};
+use std::time::Instant;
+
+/// [`crate::simplify_all`] by this method.
+pub(crate) fn simplify_all(
+    meshes: &mut [Mesh],
+    scales: &[f64],
+    options: &Options,
+    control: &dyn Control,
+) -> Result<Vec<Outcome>, SimplifyError> {
+    let start = Instant::now();
+    let before: Vec<Before> = meshes.iter().map(Before::of).collect();
+    let total = before.iter().map(|b| b.triangles).sum();
+    let cut = meshes.iter_mut().map(triangulate).collect::<Result<Vec<_>, _>>()?;
+    let mut collapsers = Vec::with_capacity(meshes.len());
+    for mesh in meshes.iter_mut() {
+        collapsers.push(Collapser::new(Work::new(mesh, options)?, options));
+    }
+    // Costs are areas times squared distances; common ones are in diagonals of the largest mesh, in world units.
+    let largest = collapsers.iter().zip(scales).map(|(c, s)| c.work.diagonal * s).fold(0.0, f64::max);
+    let common = |(c, s): (&Collapser<'_>, &f64)| {
+        if largest > 0.0 { (s / c.work.scale / largest).powi(4) } else { 1.0 }
+    };
+    let factors: Vec<f64> = collapsers.iter().zip(scales).map(common).collect();
+    let goal = exact::Goal { triangles: target(options, total), first: total };
+    let stop = match options.schedule.unwrap_or(Schedule::Bulk) {
+        Schedule::Exact => exact::run(&mut collapsers, &factors, &goal, control),
+        Schedule::Bulk => {
+            with_threads(options.threads, || bulk::run(&mut collapsers, &factors, &goal, control))
+        }
+    };
+    let mut found = Vec::with_capacity(before.len());
+    for mut c in collapsers {
+        c.work.write_back();
+        let mut refused = c.refused;
+        refused.locked += c.locked_edges;
+        let faces = c.work.mesh.face_count();
+        found.push((c.estimate(), Level { pass: 1, faces, seconds: 0.0, tried: c.tried, refused }));
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    let each = meshes.iter_mut().zip(&before).zip(found).zip(cut);
+    Ok(each
+        .map(|(((mesh, before), (estimate, mut level)), cut)| {
+            level.seconds = seconds;
+            let mut outcome = finish(mesh, before, options, (stop, estimate, vec![level]));
+            outcome.triangulated = cut;
+            outcome
+        })
+        .collect())
+}
+
+/// Cuts polygons into triangles; says how many.
+fn triangulate(mesh: &mut Mesh) -> Result<usize, SimplifyError> {
+    if mesh.topology().is_triangular() {
+        return Ok(0);
+    }
+    let done = std::mem::take(mesh).triangulate()?;
+    *mesh = done.mesh;
+    Ok(done.cut)
+}
+
+/// Removes components whose diagonal is below `fraction` of the mesh's. O(n).
+pub(crate) fn prune_components(mesh: &mut Mesh, fraction: f64) {
+    let t = mesh.topology();
+    let components = t.face_components();
+    let Some((lo, hi)) = mesh.surface_bounds() else { return };
+    let least = fraction * (hi - lo).length();
+    let mut bounds = vec![(glam::DVec3::INFINITY, glam::DVec3::NEG_INFINITY); components.count];
+    for f in t.faces() {
+        let b = &mut bounds[components.of[f.index()] as usize];
+        for p in t.face_vertices(f).map(|v| mesh.position(v)) {
+            *b = (b.0.min(p), b.1.max(p));
+        }
+    }
+    let mut gone = Bits::new(t.face_slots());
+    for f in t.faces() {
+        let (lo, hi) = bounds[components.of[f.index()] as usize];
+        if (hi - lo).length() < least {
+            gone.set(f.index());
+        }
+    }
+    let faces: Vec<_> = t.faces().filter(|f| gone.get(f.index())).collect();
+    mesh.topology_mut().remove_faces(faces);
+}
