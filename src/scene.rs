@@ -128,7 +128,8 @@ pub struct Image {
 impl Scene {
     /// A scene of one mesh in one node.
     pub fn from_mesh(mesh: SceneMesh) -> Self {
-        let node = Node { name: mesh.name.clone(), transform: DMat4::IDENTITY, mesh: Some(0), children: vec![] };
+        let node =
+            Node { name: mesh.name.clone(), transform: DMat4::IDENTITY, mesh: Some(0), children: vec![] };
         Scene { meshes: vec![mesh], nodes: vec![node], roots: vec![0], ..Default::default() }
     }
 

@@ -34,7 +34,6 @@ fn topology_is_kept() {
 }
 
 #[test]
-#[ignore = "until quadric collapse keeps to an error bound"]
 fn an_error_bound_stops_the_work_and_is_done() {
     let p = Place::new();
     p.generate("sphere", "in.obj", 1280);
@@ -259,7 +258,6 @@ fn normals_are_kept_recomputed_or_removed() {
 }
 
 #[test]
-#[ignore = "until quadric collapse cuts polygons"]
 fn polygons_are_cut_for_quadrics_and_said_so_once() {
     let p = Place::new();
     p.generate("polygons", "in.obj", 200);

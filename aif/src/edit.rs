@@ -169,7 +169,9 @@ impl Topology {
         let removed = self.other(e, kept);
         if self.edge_faces(e).is_empty() {
             // A polyline: any vertex of at most two dangling edges may go.
-            if self.star(removed).len() > 2 || self.star(removed).iter().any(|&x| !self.edge_faces(x).is_empty()) {
+            if self.star(removed).len() > 2
+                || self.star(removed).iter().any(|&x| !self.edge_faces(x).is_empty())
+            {
                 return Err(LinkViolation::SingularVertex);
             }
         } else if !self.is_regular(removed) {
@@ -210,7 +212,9 @@ impl Topology {
         }
         if !self.is_triangular() {
             let both = |f: FaceId| {
-                self.corner_range(f).len() > 3 && !faces.contains(&f) && self.face_vertices(f).any(|v| v == kept)
+                self.corner_range(f).len() > 3
+                    && !faces.contains(&f)
+                    && self.face_vertices(f).any(|v| v == kept)
             };
             if self.vertex_faces(removed).any(both) {
                 return Err(LinkViolation::CommonFace);
@@ -265,8 +269,7 @@ impl Topology {
     pub fn collapse(&mut self, e: EdgeId, kept: VertexId) -> CollapseRecord {
         debug_assert!(self.has_edge(e));
         let removed = self.other(e, kept);
-        let mut record =
-            CollapseRecord { edge: e, kept, removed, star_index: 0, wings: [None; 2] };
+        let mut record = CollapseRecord { edge: e, kept, removed, star_index: 0, wings: [None; 2] };
         let on_edge = self.edges[e.index()].faces;
         for (wing, f) in record.wings.iter_mut().zip(on_edge) {
             if f != NO_FACE {

@@ -68,12 +68,7 @@ struct Winner {
 }
 
 /// Runs until the tail, then hands over to the exact schedule. `factors[i]` turns costs of mesh `i` into common ones.
-pub(crate) fn run(
-    meshes: &mut [Collapser<'_>],
-    factors: &[f64],
-    goal: &Goal,
-    control: &dyn Control,
-) -> Stop {
+pub(crate) fn run(meshes: &mut [Collapser<'_>], factors: &[f64], goal: &Goal, control: &dyn Control) -> Stop {
     let threads = threads();
     let mut progress = Progress::new(meshes, goal, control);
     let mut lanes: Vec<Lane> = meshes.iter().map(Lane::new).collect();
@@ -152,9 +147,8 @@ impl Lane {
         let t = m.work.mesh.topology();
         let best = &self.best;
         let (dirty, blocked) = (&self.dirty, &self.blocked);
-        let wanted = |e: &Entry| {
-            e.cost <= limit && !blocked.get(e.edge.index()) && !dirty.get(e.edge.index())
-        };
+        let wanted =
+            |e: &Entry| e.cost <= limit && !blocked.get(e.edge.index()) && !dirty.get(e.edge.index());
         map_chunks(&mut self.entries, CHUNK, |chunk| {
             for e in chunk.iter().filter(|e| wanted(e)) {
                 let key = e.key();

@@ -112,9 +112,7 @@ impl<'m> Collapser<'m> {
                     .unwrap_or_else(|| least(&q, [DVec3::ZERO, middle, span]));
                 Some(Candidate { roles, to: pk + best, cost: q.at(best) })
             }
-            Placement::Midpoint => {
-                Some(Candidate { roles, to: (pk + pr) * 0.5, cost: q.at(span * 0.5) })
-            }
+            Placement::Midpoint => Some(Candidate { roles, to: (pk + pr) * 0.5, cost: q.at(span * 0.5) }),
             Placement::Endpoint => {
                 let (here, there) = (q.at(DVec3::ZERO), q.at(span));
                 // Only a vertex of the same kind can take the other's place.
@@ -225,7 +223,8 @@ impl<'m> Collapser<'m> {
         if self.bound == f64::INFINITY {
             return true;
         }
-        let weight = self.quadrics[c.roles.kept.index()].weight + self.quadrics[c.roles.removed.index()].weight;
+        let weight =
+            self.quadrics[c.roles.kept.index()].weight + self.quadrics[c.roles.removed.index()].weight;
         c.cost <= self.bound * weight
     }
 }

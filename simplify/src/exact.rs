@@ -79,12 +79,7 @@ impl<'c> Progress<'c> {
 }
 
 /// Runs until the goal is met. `factors[i]` turns costs of mesh `i` into common ones.
-pub(crate) fn run(
-    meshes: &mut [Collapser<'_>],
-    factors: &[f64],
-    goal: &Goal,
-    control: &dyn Control,
-) -> Stop {
+pub(crate) fn run(meshes: &mut [Collapser<'_>], factors: &[f64], goal: &Goal, control: &dyn Control) -> Stop {
     let numbering = Numbering::new(meshes);
     let mut progress = Progress::new(meshes, goal, control);
     if progress.left <= goal.triangles {
@@ -100,7 +95,8 @@ pub(crate) fn run(
         }
     }
     // Edges refused where they stood: they get another chance when their surroundings change, and one more at the end.
-    let mut waiting: Vec<Bits> = meshes.iter().map(|m| Bits::new(m.work.mesh.topology().edge_slots())).collect();
+    let mut waiting: Vec<Bits> =
+        meshes.iter().map(|m| Bits::new(m.work.mesh.topology().edge_slots())).collect();
     let mut bounded = false;
     let mut steps = 0u32;
     let mut left_at_end = usize::MAX;

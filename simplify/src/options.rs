@@ -173,8 +173,9 @@ pub struct Outcome {
     pub vertices_out: usize,
     /// Why it ended.
     pub stop: Stop,
-    /// Estimated error in model units: the root of the largest quadric cost per weight, or the farthest a vertex was moved (NSA,
-    /// cluster). Not a bound.
+    /// Estimated error in model units. Quadric: the root of the largest cost per weight, not a bound. NSA: the largest sum, along a chain
+    /// of collapses, of the distances of new places from the planes they replace, not a bound. Cluster: the farthest any vertex moved,
+    /// which bounds one side of the distance (result to input, at vertices).
     pub estimate: f64,
     /// The passes.
     pub levels: Vec<Level>,

@@ -22,7 +22,13 @@ pub(crate) struct RingFace {
 
 /// Appends the triangles around `v` that are not in `gone`. O(valence).
 #[inline]
-pub(crate) fn gather_ring(t: &Topology, points: &[DVec3], v: VertexId, gone: &[FaceId], ring: &mut Vec<RingFace>) {
+pub(crate) fn gather_ring(
+    t: &Topology,
+    points: &[DVec3],
+    v: VertexId,
+    gone: &[FaceId],
+    ring: &mut Vec<RingFace>,
+) {
     let apex = points[v.index()];
     for &e in t.star(v) {
         for &f in t.edge_faces(e) {

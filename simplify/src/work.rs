@@ -62,8 +62,7 @@ impl<'m> Work<'m> {
         let (lo, hi) = mesh.surface_bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
         let extent = (hi - lo).max_element();
         // A power of two near 1 / extent: 2^-1022 .. 2^1022 keeps it normal.
-        let scale =
-            if extent > 0.0 { (-extent.log2().round()).clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
+        let scale = if extent > 0.0 { (-extent.log2().round()).clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
         let centre = lo + (hi - lo) * 0.5;
         let points = mesh.positions().iter().map(|p| (p - centre) * scale).collect();
         let diagonal = ((hi - lo) * scale).length() / scale;
@@ -215,9 +214,7 @@ fn find_seams(mesh: &Mesh) -> Bits {
     for e in t.edges() {
         let &[f, g] = t.edge_faces(e) else { continue };
         let torn = wedges.is_some_and(|w| {
-            t.edge_vertices(e)
-                .iter()
-                .any(|&v| !w.same(wedge_at(mesh, w, f, v), wedge_at(mesh, w, g, v)))
+            t.edge_vertices(e).iter().any(|&v| !w.same(wedge_at(mesh, w, f, v), wedge_at(mesh, w, g, v)))
         });
         if torn || differs(mesh.face_materials(), f, g) || differs(mesh.face_groups(), f, g) {
             seams.set(e.index());

@@ -253,7 +253,7 @@ proptest! {
         name in prop::sample::select(vec!["scan", "cad", "polygons", "quad-sphere", "nonmanifold", "terrain", "soup"]),
         faces in 10usize..1500,
         seed in 0u64..1000,
-        ratio in 0.0f64..1.2,
+        ratio in 0.0f64..=1.0,
         placement in prop::sample::select(vec![Placement::Midpoint, Placement::Endpoint, Placement::Optimal]),
     ) {
         let input = sample(name, faces, seed);

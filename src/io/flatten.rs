@@ -357,3 +357,51 @@ mod tests {
         assert!(flatten(&scene, "X").geometry.positions.is_f64());
     }
 }
+
+#[cfg(test)]
+mod uv_tests {
+    use crate::aif::attributes::Semantic;
+    use crate::io::Format;
+    use crate::io::{NoSide, decode, encode};
+    use crate::meshes::{GenerateOptions, generate};
+    use crate::scene::Scene;
+
+    /// Position of a corner and its texture coordinates, for all corners, sorted.
+    fn corners(scene: &Scene) -> Vec<[i64; 5]> {
+        let m = &scene.meshes[0].geometry;
+        let w = m.wedges.as_ref().unwrap();
+        let k = w.channel(&Semantic::TexCoord(0)).unwrap();
+        let round = |x: f64| (x * 98_765.0).round() as i64;
+        let mut all: Vec<[i64; 5]> = m
+            .corners
+            .iter()
+            .zip(&w.corner)
+            .map(|(&v, &wedge)| {
+                let (p, uv) = (m.positions.get(v as usize), w.get(wedge, k).unwrap());
+                [p.x, p.y, p.z, uv[0] as f64, uv[1] as f64].map(round)
+            })
+            .collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    #[test]
+    fn v_is_turned_over_once_on_the_way_to_gltf_and_once_back() {
+        let sample = generate("quad-sphere", &GenerateOptions::default().with_faces(24)).unwrap();
+        let scene = crate::samples::scene(sample, "s");
+        let through = |format, scene: &Scene| {
+            let bytes = encode(format, scene, &Default::default()).unwrap().bytes;
+            decode(format, &bytes, &NoSide).unwrap().scene
+        };
+        let mut expected = corners(&scene);
+        let glb = through(Format::Glb, &scene);
+        assert_eq!(corners(&through(Format::Glb, &glb)), corners(&glb));
+        assert_eq!(corners(&through(Format::Obj, &glb)), expected);
+        for c in &mut expected {
+            c[4] = 98_765 - c[4];
+        }
+        expected.sort_unstable();
+        assert_eq!(corners(&glb), expected);
+    }
+}

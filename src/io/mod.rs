@@ -13,7 +13,6 @@ pub mod off;
 pub mod ply;
 pub mod stl;
 pub(crate) mod text;
-mod uv;
 
 use crate::scene::Scene;
 
@@ -181,7 +180,6 @@ pub fn decode(format: Format, bytes: &[u8], side: &dyn Side) -> Result<Decoded, 
 
 /// Encodes a scene. Texture coordinates are turned over where the format's run the other way than the scene's.
 pub fn encode(format: Format, scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeError> {
-    let scene = &*uv::for_format(scene, format);
     match format {
         Format::Obj => obj::encode(scene, options),
         Format::Gltf | Format::Glb => gltf::encode(scene, format, options),
