@@ -8,5 +8,6 @@ pub use progmesh_simplify as simplify;
 pub mod io;
 pub mod normals;
 pub mod pipeline;
+pub mod report;
 pub mod samples;
 pub mod scene;

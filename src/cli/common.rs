@@ -7,10 +7,11 @@ use progmesh::aif::Weld;
 use progmesh::io::files::{self, Loaded, ReadError, WriteError};
 use progmesh::io::{Format, encode};
 use progmesh::normals::{DEFAULT_CREASE, Normals};
+use progmesh::report::{Picture, Style, Surface, SurfaceError, View, render};
 use progmesh::scene::Scene;
 use std::collections::BTreeSet;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A format, as flags name it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -76,6 +77,67 @@ impl Shape {
             NormalsName::Recompute => Normals::Recompute { crease: self.crease.unwrap_or(DEFAULT_CREASE) },
             NormalsName::None => Normals::Remove,
         })
+    }
+}
+
+/// `--png`, `--wireframe`: a picture.
+#[derive(clap::Args, Debug)]
+pub(crate) struct PictureArgs {
+    /// Draw a picture to this PNG file (with simplify: input and result side by side, from the same camera)
+    ///
+    /// Material base colours and the mesh's normals; no textures.
+    #[arg(long, value_name = "FILE.png", help_heading = "Picture")]
+    png: Option<PathBuf>,
+    /// With --png: draw the edges of the faces too
+    #[arg(long, requires = "png", help_heading = "Picture")]
+    wireframe: bool,
+}
+
+/// Sides of each picture, pixels.
+const PICTURE: (u32, u32) = (480, 400);
+const WHITE: [u8; 3] = [255; 3];
+
+/// Pictures under way: all from the camera of the first.
+pub(crate) struct Drawing {
+    path: PathBuf,
+    style: Style,
+    view: Option<View>,
+    pictures: Vec<Picture>,
+}
+
+impl PictureArgs {
+    /// A drawing if one is asked for.
+    pub(crate) fn drawing(&self) -> Result<Option<Drawing>, Failure> {
+        let Some(path) = self.png.clone() else { return Ok(None) };
+        if files::is_dash(&path) {
+            return Err(Failure::Usage("--png: write the picture to a path, not to standard output".into()));
+        }
+        let mut style = Style::default();
+        style.wireframe = self.wireframe;
+        Ok(Some(Drawing { path, style, view: None, pictures: vec![] }))
+    }
+}
+
+impl Drawing {
+    /// Draws a scene, to the right of those before.
+    pub(crate) fn add(&mut self, scene: &Scene) -> Result<(), SurfaceError> {
+        let surface = Surface::of(scene)?;
+        let (width, height) = PICTURE;
+        let first = || View::three_quarter(surface.bounds(), width, height).tightened(&surface);
+        let view = self.view.get_or_insert_with(first);
+        let mut picture = render(&surface, view, &self.style);
+        let n = surface.triangle_count();
+        picture.caption(&format!("{} triangle{}", thousands(n), if n == 1 { "" } else { "s" }), [64; 3]);
+        self.pictures.push(picture);
+        Ok(())
+    }
+
+    /// Writes the file, all or nothing.
+    pub(crate) fn write(&self) -> Result<(), Failure> {
+        let failed = |why: String| Failure::Output(format!("{}: {why}", self.path.display()));
+        let bytes = Picture::beside(&self.pictures, WHITE).png();
+        let bytes = bytes.ok_or_else(|| failed("the picture could not be encoded".into()))?;
+        files::write_file(&self.path, &bytes).map_err(|e| failed(e.to_string()))
     }
 }
 

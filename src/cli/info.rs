@@ -1,6 +1,6 @@
 //! `progmesh info IN`.
 
-use super::common::{self, FormatName, Warnings, not_negative, short, thousands};
+use super::common::{self, FormatName, PictureArgs, Warnings, not_negative, short, thousands};
 use super::{Failure, common::name, problems};
 use progmesh::aif::attributes::{Encoding, Semantic};
 use progmesh::aif::{BuildOptions, BuildReport, Mesh, NONE, Weld};
@@ -20,6 +20,7 @@ Examples:
   progmesh info scene.glb --json
   progmesh info scan.ply --check && echo valid
   progmesh info part.stl --weld=0.001
+  progmesh info bunny.obj --png bunny.png --wireframe
 
 --check ends with exit code 1 if a mesh breaks an invariant, and names the first. A file that holds no mesh at all (an index \
 out of range, a coordinate that is not a number) is invalid input: exit code 3, with or without --check.")]
@@ -40,6 +41,8 @@ pub(crate) struct Args {
     /// Print one JSON object (see docs/json.md)
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    picture: PictureArgs,
     /// Say no warnings
     #[arg(long, short)]
     quiet: bool,
@@ -47,11 +50,14 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
+        let mut drawing = self.picture.drawing()?;
         let mut warnings = Warnings::new(self.quiet);
         let loaded = common::read(&self.input, self.from, &mut warnings)?;
         let file = name(&self.input, "standard input");
         let mut scene = loaded.decoded.scene;
         let options = BuildOptions::with_weld(common::weld_rule(self.weld));
+        // Before the meshes are taken; what is wrong with one is said below, with its name.
+        let drawn = drawing.as_mut().map(|d| d.add(&scene));
         let (mut meshes, mut broken) = (Vec::new(), None);
         for i in 0..scene.meshes.len() {
             let label = label(&scene, i);
@@ -67,6 +73,10 @@ impl Args {
                 broken = first_broken(&mesh, own).map(|b| format!("{label}{b}"));
             }
             meshes.push(MeshInfo::of(&scene, i, &mesh, &report));
+        }
+        drawn.transpose().map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+        if let Some(d) = &drawing {
+            d.write()?;
         }
         let info = Info {
             command: "info",

@@ -1,6 +1,6 @@
 //! `progmesh simplify IN OUT`.
 
-use super::common::{self, FormatName, Shape, Warnings, short, thousands};
+use super::common::{self, FormatName, PictureArgs, Shape, Warnings, short, thousands};
 use super::control::{Interrupt, Progress};
 use super::{Failure, common::name};
 use clap::ValueEnum;
@@ -23,6 +23,7 @@ Examples:
   progmesh simplify scan.ply scan.stl --max-error 0.001 --relative
   progmesh simplify horse.ply out.ply --method nsa --epsilon 12 --passes 5
   progmesh simplify map.obj out.obj --ratio 0.1 --lock-border --lock-material water
+  progmesh simplify scan.ply out.ply --ratio 0.1 --png before-and-after.png
   progmesh simplify - - --from ply --to ply --ratio 0.2 < in.ply > out.ply
 
 Exit code 1 means: done and written, but the target could not be met; the message says why.")]
@@ -100,6 +101,8 @@ pub(crate) struct Args {
 
     #[command(flatten)]
     shape: Shape,
+    #[command(flatten)]
+    picture: PictureArgs,
     /// Write text where the format has text and binary (PLY, STL)
     #[arg(long)]
     text: bool,
@@ -142,6 +145,7 @@ impl Args {
         let start = Instant::now();
         let job = self.job()?;
         let format = common::output_format(&self.output, self.to)?;
+        let mut drawing = self.picture.drawing()?;
         if self.json && files::is_dash(&self.output) {
             return Err(Failure::Usage(
                 "--json and OUT both want standard output; write OUT to a path".into(),
@@ -157,6 +161,9 @@ impl Args {
             let loaded = common::read(&self.input, self.from, &mut warnings)?;
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
+            if let Some(d) = &mut drawing {
+                d.add(&loaded.decoded.scene).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+            }
             let result = simplify_scene(loaded.decoded.scene, &job, &Progress::new(&interrupt, self.quiet));
             let (scene, summary) = result.map_err(|e| failure(&file, e))?;
             warnings.say(summary.warnings.iter().map(|w| format!("{file}: {w}")));
@@ -165,11 +172,19 @@ impl Args {
                 Stop::Cancelled => Err(Failure::Interrupted),
                 _ => common::write(&self.output, format, self.text, &scene, &interrupt, &mut warnings),
             };
+            let write = writing.elapsed().as_secs_f64();
+            let written = written.and_then(|()| match &mut drawing {
+                Some(d) => {
+                    d.add(&scene).map_err(|e| Failure::Output(format!("the result: {e}")))?;
+                    d.write()
+                }
+                None => Ok(()),
+            });
             let seconds = Seconds {
                 read,
                 build: summary.build_seconds,
                 simplify: summary.simplify_seconds,
-                write: writing.elapsed().as_secs_f64(),
+                write,
                 total: start.elapsed().as_secs_f64(),
             };
             Ok((summary, seconds, written))

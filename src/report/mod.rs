@@ -1,0 +1,20 @@
+//! Looking at results: pictures and silhouettes of a scene, drawn in software, without a display.
+//!
+//! A [`Surface`] is what a scene shows, as triangles in the world; a [`View`] says from where; [`render`] draws a [`Picture`], and
+//! [`silhouette`] the [`Mask`] of what is covered. The same surface and view give the same pixels on every platform:
+//! coverage is decided in integers, and shading uses no operation that IEEE 754 leaves open.
+//!
+//! Not physically based, and no textures: a picture shows shape and material base colours.
+
+mod clip;
+mod font;
+mod picture;
+mod raster;
+mod render;
+mod surface;
+mod view;
+
+pub use picture::Picture;
+pub use render::{Mask, Shading, Style, render, silhouette};
+pub use surface::{Surface, SurfaceError};
+pub use view::{Projection, View};
