@@ -186,7 +186,8 @@ impl Lane {
 
     /// Collapses the winners, cheapest first only where not all are needed.
     fn perform(&mut self, m: &mut Collapser<'_>, mut winners: Vec<Winner>, progress: &mut Progress<'_>) {
-        if 2 * winners.len() > progress.left - progress.goal {
+        // Another mesh may have reached the goal already.
+        if 2 * winners.len() > progress.left.saturating_sub(progress.goal) {
             winners.sort_unstable_by_key(|w| w.key);
         }
         self.touched.clear(m.work.points.len());

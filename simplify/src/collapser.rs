@@ -3,7 +3,7 @@
 
 use crate::options::{Options, Placement, Refused};
 use crate::quadric::Quadric;
-use crate::validity::{MAX_VALENCE, RingFace, gather_ring};
+use crate::validity::{HUB, MAX_VALENCE, RingFace, gather_ring};
 use crate::wedges::WedgeMerge;
 use crate::work::{Kind, Roles, Work};
 use glam::DVec3;
@@ -42,6 +42,8 @@ pub(crate) struct Collapser<'m> {
     pub(crate) worst: f64,
     /// Costs per weight may not pass this, local units.
     pub(crate) bound: f64,
+    /// The bound forbade the rounded place of a candidate.
+    pub(crate) bounded: bool,
     pub(crate) tried: u64,
     pub(crate) refused: Refused,
     /// Edges that the kinds of their vertices forbid, as last counted.
@@ -64,6 +66,8 @@ pub(crate) enum Refusal {
     Border,
     Flip,
     Valence,
+    /// Once rounded, it would pass the error bound.
+    Error,
 }
 
 impl<'m> Collapser<'m> {
@@ -82,6 +86,7 @@ impl<'m> Collapser<'m> {
             placement,
             worst: 0.0,
             bound,
+            bounded: false,
             tried: 0,
             refused: Refused::default(),
             locked_edges: 0,
@@ -136,6 +141,10 @@ impl<'m> Collapser<'m> {
 
     /// Does what a fresh [`Collapser::check`] found, and counts it.
     pub(crate) fn follow(&mut self, e: EdgeId, c: &Candidate, verdict: Result<DVec3, Refusal>) -> bool {
+        if let Err(Refusal::Error) = verdict {
+            self.bounded = true;
+            return false;
+        }
         self.tried += 1;
         let refusal = match verdict {
             Ok(to) => {
@@ -149,6 +158,7 @@ impl<'m> Collapser<'m> {
             Refusal::Border => self.refused.border += 1,
             Refusal::Flip => self.refused.flip += 1,
             Refusal::Valence => self.refused.valence += 1,
+            Refusal::Error => {}
         }
         false
     }
@@ -161,7 +171,7 @@ impl<'m> Collapser<'m> {
         let t = work.mesh.topology();
         // Two edges fall together with two others, and the collapsed one goes: a hub may shrink, not grow.
         let (vk, vr) = (t.star(kept).len(), t.star(removed).len());
-        if vk + vr > MAX_VALENCE + 4 && vk.min(vr) > 4 {
+        if vk.max(vr) > HUB || (vk + vr > MAX_VALENCE + 4 && vk.min(vr) > 4) {
             return Err(Refusal::Valence);
         }
         if work.pinches_seam(e) {
@@ -190,6 +200,19 @@ impl<'m> Collapser<'m> {
         }
         if !fixed && self.placement != Placement::Endpoint {
             to = work.round(to);
+            // Near the largest numbers there may be no such place.
+            if !to.is_finite() {
+                return Err(Refusal::Flip);
+            }
+            // Far from the origin rounding may cost more than the collapse.
+            if self.bound < f64::INFINITY && to != c.to {
+                let origin = points[kept.index()];
+                let q = self.quadrics[kept.index()]
+                    .plus(&self.quadrics[removed.index()].moved(origin - points[removed.index()]));
+                if q.at(to - origin) > self.bound * q.weight {
+                    return Err(Refusal::Error);
+                }
+            }
         }
         // A kept vertex that does not move changes none of its own faces.
         let moving = if to == points[kept.index()] { &ring[..of_removed] } else { &ring[..] };

@@ -74,7 +74,9 @@ impl<'c> Progress<'c> {
     /// Tells the caller.
     pub(crate) fn report(&self) {
         let whole = self.first.saturating_sub(self.goal).max(1);
-        self.control.progress((self.first - self.left) as f64 / whole as f64);
+        // The last collapse may pass the goal by a triangle.
+        let done = self.first.saturating_sub(self.left) as f64 / whole as f64;
+        self.control.progress(done.min(1.0));
     }
 }
 
@@ -157,7 +159,7 @@ pub(crate) fn run(meshes: &mut [Collapser<'_>], factors: &[f64], goal: &Goal, co
     }
     match () {
         _ if progress.left <= goal.triangles => Stop::Target,
-        _ if bounded => Stop::Error,
+        _ if bounded || meshes.iter().any(|m| m.bounded) => Stop::Error,
         _ => Stop::NoLegalCollapse,
     }
 }

@@ -62,6 +62,9 @@ pub fn simplify_all(
 ) -> Result<Vec<Outcome>, SimplifyError> {
     assert_eq!(meshes.len(), scales.len(), "one scale for each mesh");
     validate(options)?;
+    // Before anything changes.
+    meshes.iter().try_for_each(|m| work::check_weights(m, options))?;
+    let faces_in: Vec<usize> = meshes.iter().map(Mesh::face_count).collect();
     let total: usize = meshes.iter().map(Mesh::triangle_count).sum();
     let mut options = std::borrow::Cow::Borrowed(options);
     if let Some(fraction) = options.prune {
@@ -72,11 +75,15 @@ pub fn simplify_all(
             o.ratio = None;
         }
     }
-    match options.method {
+    let mut outcomes = match options.method {
         Method::Nsa => nsa::simplify_all(meshes, &options, control),
         Method::Quadric => quadric_collapse::simplify_all(meshes, scales, &options, control),
         Method::Cluster => cluster::simplify_all(meshes, scales, &options, control),
+    }?;
+    for (outcome, faces) in outcomes.iter_mut().zip(faces_in) {
+        outcome.faces_in = faces;
     }
+    Ok(outcomes)
 }
 
 /// Refuses options out of their range.

@@ -42,8 +42,9 @@ pub(crate) fn simplify_all(
         c.work.write_back();
         let mut refused = c.refused;
         refused.locked += c.locked_edges;
+        let tried = c.tried + c.locked_edges;
         let faces = c.work.mesh.face_count();
-        found.push((c.estimate(), Level { pass: 1, faces, seconds: 0.0, tried: c.tried, refused }));
+        found.push((c.estimate(), Level { pass: 1, faces, seconds: 0.0, tried, refused }));
     }
     let seconds = start.elapsed().as_secs_f64();
     let each = meshes.iter_mut().zip(&before).zip(found).zip(cut);

@@ -11,6 +11,9 @@ const MIN_TURN: f64 = 0.2;
 const MIN_SHAPE: f64 = 1e-3;
 /// Most edges at a vertex.
 pub(crate) const MAX_VALENCE: usize = 32;
+/// A vertex of more edges takes no part in a collapse: its ring has to shrink first. Otherwise all its edges would be tried at the cost
+/// of its whole star each, quadratic work on the caps of a cylinder.
+pub(crate) const HUB: usize = 512;
 
 /// A triangle (apex, x, y) around a vertex that moves.
 #[derive(Clone, Copy, Debug)]

@@ -38,7 +38,7 @@ impl WedgeMerge {
         let t = work.mesh.topology();
         let mut sides: [Option<Side>; 2] = [None, None];
         for (side, &f) in sides.iter_mut().zip(t.edge_faces(e)) {
-            *side = Some(make_side(work, &wedges, f, roles, to));
+            *side = Some(make_side(work, &wedges, f, e, roles, to));
         }
         // Where the edge is no seam, both sides have the same pair: the one whose triangle the new place lies over decides.
         if let [Some(x), Some(y)] = &sides
@@ -169,8 +169,9 @@ fn renormalise(v: &mut [f32], instead: &[f32]) {
     }
 }
 
-/// The wedges of `f`, and the barycentric weights of the point of `f` (clamped) that lies nearest to `to`.
-fn make_side(work: &Work<'_>, wedges: &Wedges, f: FaceId, roles: &Roles, to: DVec3) -> Side {
+/// The wedges of `f`, and the barycentric weights of the point of `f` (clamped) that lies nearest to `to`; of the nearest point of `e`
+/// where that is a seam, so that what is equal on both sides stays equal.
+fn make_side(work: &Work<'_>, wedges: &Wedges, f: FaceId, e: EdgeId, roles: &Roles, to: DVec3) -> Side {
     let t = work.mesh.topology();
     let tip = t.face_vertices(f).find(|&v| v != roles.kept && v != roles.removed).unwrap_or(roles.kept);
     let at = |v: VertexId| wedge_at(work.mesh, wedges, f, v);
@@ -180,9 +181,9 @@ fn make_side(work: &Work<'_>, wedges: &Wedges, f: FaceId, roles: &Roles, to: DVe
     let n = along.cross(c - k);
     let area = n.length_squared();
     let mut weights = [1.0, 0.0, 0.0];
-    let triangle = t.corner_range(f).len() == 3;
+    let inside = t.corner_range(f).len() == 3 && !work.seams.get(e.index());
     // Height over the edge towards the tip; below it, only the edge counts.
-    let height = if triangle && area > 0.0 { along.cross(to - k).dot(n) / area } else { 0.0 };
+    let height = if inside && area > 0.0 { along.cross(to - k).dot(n) / area } else { 0.0 };
     let height = height.clamp(0.0, 1.0);
     let length = along.length_squared();
     if length > 0.0 {

@@ -47,25 +47,16 @@ pub(crate) struct Work<'m> {
 impl<'m> Work<'m> {
     /// Takes a mesh and works out what may move. O(n).
     pub(crate) fn new(mesh: &'m mut Mesh, options: &Options) -> Result<Self, SimplifyError> {
+        check_weights(mesh, options)?;
         let slots = mesh.topology().vertex_slots();
-        let weights = options.vertex_weights.len();
-        if weights != 0 && weights != slots {
-            return Err(SimplifyError::Length { option: "vertex_weights", len: weights, want: slots });
-        }
-        if let Some(&bad) = options.vertex_weights.iter().find(|w| !w.is_finite() || **w < 0.0) {
-            return Err(SimplifyError::Range {
-                option: "a vertex weight",
-                value: bad as f64,
-                range: "finite and not negative",
-            });
-        }
         let (lo, hi) = mesh.surface_bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
         let extent = (hi - lo).max_element();
         // A power of two near 1 / extent: 2^-1022 .. 2^1022 keeps it normal.
-        let scale = if extent > 0.0 { (-extent.log2().round()).clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
-        let centre = lo + (hi - lo) * 0.5;
+        let scale = if extent > 0.0 { (-extent.log2().round()).clamp(-1022.0, 1022.0).exp2() } else { 1.0 };
+        // Halves first: the extent of what fills f64 is none.
+        let centre = lo * 0.5 + hi * 0.5;
         let points = mesh.positions().iter().map(|p| (p - centre) * scale).collect();
-        let diagonal = ((hi - lo) * scale).length() / scale;
+        let diagonal = ((hi * 0.5 - lo * 0.5) * scale).length() * 2.0 / scale;
         let triangles = mesh.triangle_count();
         let seams = find_seams(mesh);
         let mut work = Work {
@@ -146,7 +137,7 @@ impl<'m> Work<'m> {
     #[inline]
     pub(crate) fn pinches_seam(&self, e: EdgeId) -> bool {
         let t = self.mesh.topology();
-        let feature = |x: EdgeId| self.seams.get(x.index()) || t.edge_faces(x).len() == 1;
+        let feature = |x: EdgeId| self.seams.get(x.index()) || t.edge_faces(x).len() != 2;
         self.seams.count() > 0
             && t.edge_faces(e).iter().any(|&f| {
                 let features = t.face_edges(f).iter().filter(|u| u.edge() != e && feature(u.edge())).count();
@@ -167,7 +158,7 @@ impl<'m> Work<'m> {
     }
 
     /// `p` as it will read back after it was written to the mesh, so that what is tested is what results. Exact for f32 meshes; for f64
-    /// ones the rounding is far below anything tested.
+    /// ones the rounding is far below anything tested. Not finite where the mesh could not hold it.
     #[inline]
     pub(crate) fn round(&self, p: DVec3) -> DVec3 {
         match self.mesh.positions() {
@@ -175,7 +166,8 @@ impl<'m> Work<'m> {
                 let q = self.mesh.positions().round(p / self.scale + self.centre);
                 (q - self.centre) * self.scale
             }
-            Positions::F64(_) => p,
+            Positions::F64(_) if (p / self.scale + self.centre).is_finite() => p,
+            Positions::F64(_) => DVec3::NAN,
         }
     }
 
@@ -187,6 +179,22 @@ impl<'m> Work<'m> {
                 self.mesh.positions_mut().set(v, p);
             }
         }
+    }
+}
+
+/// Refuses vertex weights that are not one for each slot, finite and not negative.
+pub(crate) fn check_weights(mesh: &Mesh, options: &Options) -> Result<(), SimplifyError> {
+    let (len, want) = (options.vertex_weights.len(), mesh.topology().vertex_slots());
+    if len != 0 && len != want {
+        return Err(SimplifyError::Length { option: "vertex_weights", len, want });
+    }
+    match options.vertex_weights.iter().find(|w| !w.is_finite() || **w < 0.0) {
+        Some(&bad) => Err(SimplifyError::Range {
+            option: "a vertex weight",
+            value: bad as f64,
+            range: "finite and not negative",
+        }),
+        None => Ok(()),
     }
 }
 

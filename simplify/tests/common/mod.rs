@@ -1,6 +1,8 @@
 //! Sample meshes as meshes, and what a simplification must not change.
 #![allow(dead_code)]
 
+pub(crate) mod distance;
+
 use progmesh_aif::*;
 use progmesh_meshes::{GenerateOptions, Sample, generate};
 
