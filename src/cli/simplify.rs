@@ -94,7 +94,7 @@ pub(crate) struct Args {
     /// Index-only: no vertex moves and all are kept, so that several levels can share one vertex buffer
     #[arg(long, help_heading = "What stays")]
     keep_vertices: bool,
-    /// Once nothing else is legal, remove components smaller than this part of the mesh's diagonal
+    /// First remove components smaller than this part of the mesh's diagonal
     #[arg(long, value_name = "FRACTION", value_parser = common::fraction, allow_negative_numbers = true,
           help_heading = "What stays")]
     prune: Option<f64>,
