@@ -1,4 +1,8 @@
 //! progmesh: progressive and multiresolution meshes.
+//!
+//! Scenes and file formats ([`scene`], [`io`]), simplification of whole scenes ([`pipeline`]), pictures of them ([`report`]), and the
+//! libraries below under short names: [`aif`] (the mesh), [`simplify`], [`refine`] (levels), [`meshes`] (samples). All works
+//! on bytes and arrays; only `io::files` (feature `files`) opens paths. `ARCHITECTURE.md` says how the parts fit together.
 
 pub use progmesh_aif as aif;
 pub use progmesh_meshes as meshes;
@@ -11,3 +15,8 @@ pub mod pipeline;
 pub mod report;
 pub mod samples;
 pub mod scene;
+
+/// The README's example must compile.
+#[cfg(all(doctest, feature = "files"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
