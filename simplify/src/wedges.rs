@@ -75,7 +75,7 @@ impl WedgeMerge {
     fn interpolate(&mut self, wedges: &Wedges, side: &Side) {
         for (k, channel) in wedges.channels().iter().enumerate() {
             let range = wedges.offset(k)..wedges.offset(k) + channel.width;
-            // Of the three, those that have the channel; the kept wedge's own value if none has.
+            // Of the three, those that have the channel; if none counts, the kept wedge's own value, or else the removed one's.
             let mut sum = 0.0;
             self.row[range.clone()].fill(0.0);
             let mut acc = [0.0f64; 16];
@@ -93,7 +93,9 @@ impl WedgeMerge {
                 }
             }
             if sum == 0.0 {
-                self.row[range.clone()].copy_from_slice(&wedges.row(side.wedges[0])[range]);
+                let [kept, removed, _] = side.wedges;
+                let values = wedges.get(kept, k).or(wedges.get(removed, k));
+                self.row[range.clone()].copy_from_slice(values.unwrap_or(&wedges.row(kept)[range]));
                 continue;
             }
             let out = &mut self.row[range.clone()];

@@ -112,3 +112,19 @@ fn all_vertices_at_one_place() {
     let m = Mesh::from_triangles(points, &sphere.triangles()).unwrap();
     all_are_quick("point", &m);
 }
+
+#[test]
+fn a_spire_on_a_locked_rim() {
+    // Every edge of the hub comes up, and none may be collapsed: none may cost the whole star.
+    let input = fan(50_000, 20.0);
+    for schedule in [Schedule::Exact, Schedule::Bulk] {
+        let mut m = input.clone();
+        let mut o = Options::default();
+        (o.schedule, o.lock_border) = (Some(schedule), true);
+        let start = Instant::now();
+        let out = simplify(&mut m, &o, &Quiet).unwrap();
+        assert!(start.elapsed() < Duration::from_secs(4), "{:?}", start.elapsed());
+        assert_eq!((out.stop, out.faces_out, m.check()), (Stop::NoLegalCollapse, 50_000, Ok(())));
+        assert!(out.levels[0].refused.valence >= 50_000);
+    }
+}
