@@ -154,6 +154,15 @@ pub fn simplify_scene(
     let diagonal = scale::world_diagonal(&scene);
     let scales = world_scales(&scene);
 
+    // Targets count what the file has, faces that building leaves out included.
+    let triangles: Vec<usize> = scene.meshes.iter().map(SceneMesh::triangles).collect();
+    let faces_in = scene.meshes.iter().map(|m| m.geometry.face_count()).sum();
+    let triangles_in: usize = triangles.iter().sum();
+    let target = target(&options, &triangles, job.per_mesh);
+    if !job.per_mesh {
+        (options.triangles, options.ratio) = (target, None);
+    }
+
     let mut meshes = Vec::with_capacity(scene.meshes.len());
     let mut changes = Changes::default();
     for i in 0..scene.meshes.len() {
@@ -165,8 +174,6 @@ pub fn simplify_scene(
         meshes.push(mesh);
     }
     warnings.extend(changes.warnings());
-    let triangles: Vec<usize> = meshes.iter().map(Mesh::triangle_count).collect();
-    let triangles_in: usize = triangles.iter().sum();
     if triangles_in == 0 {
         warnings.push("the input has no faces".into());
     }
@@ -182,6 +189,7 @@ pub fn simplify_scene(
         let mut done = 0;
         for (i, mesh) in meshes.iter_mut().enumerate() {
             let mut own = options.clone();
+            (own.triangles, own.ratio) = (self::target(&options, &triangles[i..=i], true), None);
             locks::by_vertex(mesh, job, &mut own)?;
             let part = Part {
                 control,
@@ -220,10 +228,9 @@ pub fn simplify_scene(
     if isolated > 0 {
         warnings.push(format!("{isolated} vertices without a face were left out"));
     }
-    let target = target(&options, &triangles, job.per_mesh);
     let triangles_out = outcomes.iter().map(|o| o.triangles_out).sum();
     let summary = Summary {
-        faces_in: outcomes.iter().map(|o| o.faces_in).sum(),
+        faces_in,
         faces_out: outcomes.iter().map(|o| o.faces_out).sum(),
         triangles_in,
         triangles_out,
