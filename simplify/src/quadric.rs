@@ -140,4 +140,31 @@ mod tests {
         assert!((m - DVec3::new(0.5, 0.25, 0.0)).length() < 1e-5, "{m}");
         assert_eq!(Quadric::default().minimise(DVec3::ZERO, 0.0), None);
     }
+
+    proptest::proptest! {
+        /// nalgebra solves the same system by Cholesky.
+        #[test]
+        fn the_minimum_is_that_of_a_dense_solver(
+            planes in proptest::collection::vec((proptest::array::uniform3(-1.0f64..1.0), 0.1f64..10.0), 3..8),
+            at in proptest::array::uniform3(-2.0f64..2.0),
+            m in proptest::array::uniform3(-1.0f64..1.0),
+            lambda in 1e-3f64..1.0,
+        ) {
+            let mut q = Quadric::default();
+            for (n, k) in &planes {
+                let n = DVec3::from_array(*n);
+                if n.length() > 0.1 {
+                    q.add_plane(n.normalize(), *k);
+                }
+            }
+            let (q, m) = (q.moved(DVec3::from_array(at)), DVec3::from_array(m));
+            let found = q.minimise(m, lambda).unwrap();
+            let [xx, xy, xz, yy, yz, zz] = q.a;
+            let a = nalgebra::Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+                + nalgebra::Matrix3::identity() * lambda;
+            let r = m * lambda - q.b;
+            let x = a.cholesky().unwrap().solve(&nalgebra::Vector3::new(r.x, r.y, r.z));
+            proptest::prop_assert!(found.distance(DVec3::new(x.x, x.y, x.z)) < 1e-9 * (1.0 + found.length()));
+        }
+    }
 }
