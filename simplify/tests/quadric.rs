@@ -549,3 +549,73 @@ fn a_vertex_that_is_not_there_may_be_locked() {
     let out = run(&mut m, |o| (o.locked_vertices, o.triangles) = (far, Some(20)));
     assert_eq!((out.stop, out.faces_out), (Stop::Target, 20));
 }
+
+/// A target just above where the exact schedule takes over: rounds do all of the work.
+const ROUNDS_ONLY: usize = 33_000;
+
+#[test]
+fn rounds_keep_what_single_steps_keep() {
+    for (name, faces) in
+        [("scan", 45_000), ("terrain", 45_000), ("torus", 45_000), ("nonmanifold", 45_000), ("soup", 1)]
+    {
+        let input = if name == "soup" { damaged() } else { sample(name, faces, 3) };
+        assert!(input.triangle_count() > 40_000, "{name} has {}", input.triangle_count());
+        // By edge: which loop goes on where at a cut vertex depends on the order of its edges.
+        let (mut shape, rim) = (topology_of(&input), border_edges(&input));
+        let isolated = input.topology().vertices().filter(|&v| input.topology().star(v).is_empty()).count();
+        shape.0 -= isolated as i64;
+        let locked: Vec<usize> = (0..input.vertex_count()).step_by(11).collect();
+        for p in PLACEMENTS {
+            let mut m = input.clone();
+            let out = run(&mut m, |o| {
+                (o.placement, o.triangles, o.lock_border) = (Some(p), Some(ROUNDS_ONLY), true);
+                locked.iter().for_each(|&v| o.locked_vertices.set(v));
+            });
+            assert_eq!(topology_of(&m), shape, "{name} {p:?}");
+            assert!(border_edges(&m) == rim, "{name} {p:?}");
+            assert_eq!(out.stop, Stop::Target, "{name} {p:?}");
+            assert!(out.triangles_out + 2 > ROUNDS_ONLY);
+            let left = places(&m);
+            let t = input.topology();
+            let stays = |&&v: &&usize| !t.star(VertexId(v as u32)).is_empty();
+            assert!(
+                locked.iter().filter(stays).all(|&v| left.contains(&input.positions().bits(v))),
+                "{name} {p:?}"
+            );
+        }
+        let mut m = input.clone();
+        run(&mut m, |o| (o.keep_vertices, o.triangles) = (true, Some(ROUNDS_ONLY)));
+        assert_eq!(m.positions(), input.positions(), "{name}");
+        let size = input.surface_bounds().map_or(0.0, |(a, b)| (b - a).length());
+        let mut m = input.clone();
+        let out = run(&mut m, |o| o.max_error = Some(MaxError { value: 1e-4, relative: true }));
+        assert!(out.estimate <= 1e-4 * size * (1.0 + 1e-6) && out.stop == Stop::Error, "{name}: {out:?}");
+    }
+}
+
+/// The ends of all border edges, bit for bit.
+fn border_edges(m: &Mesh) -> HashSet<[[u64; 3]; 2]> {
+    let t = m.topology();
+    let ends = |e| {
+        let mut ends = t.edge_vertices(e).map(|v| m.positions().bits(v.index()));
+        ends.sort();
+        ends
+    };
+    t.edges().filter(|&e| t.edge_faces(e).len() == 1).map(ends).collect()
+}
+
+/// A large sphere with holes, doubled and turned faces, and vertices that are joined.
+fn damaged() -> Mesh {
+    let ball = sample("sphere", 45_000, 0);
+    let mut triangles = ball.triangles();
+    triangles.retain(|t| t[0] % 101 != 0);
+    for i in (0..triangles.len()).step_by(97) {
+        triangles[i].reverse();
+        triangles.push(triangles[i + 1]);
+    }
+    for v in triangles.as_flattened_mut().iter_mut().filter(|v| **v % 997 == 5) {
+        *v = 5;
+    }
+    let p = ball.positions().iter().map(|p| p.to_array().map(|x| x as f32)).collect::<Vec<_>>();
+    Mesh::from_triangles(p, &triangles).unwrap()
+}

@@ -56,16 +56,19 @@ fn with_rows(m: &Mesh, channels: &[Channel], row: impl Fn(usize, DVec3) -> Vec<f
     Mesh::build(input, &BuildOptions::default()).unwrap().0
 }
 
+/// Triangles of a chart, and their uvs.
+type Chart = (Vec<[u32; 3]>, Vec<[[f64; 2]; 3]>);
+
 fn chart([u, v]: [f64; 2]) -> (i32, i32) {
     ((u * 3.0).floor() as i32, (v * 2.0).floor() as i32)
 }
 
 #[test]
 fn charts_stay_whole_and_normals_continuous() {
-    let input = sample("quad-sphere", 6000, 0).triangulate().unwrap().mesh;
+    let input = sample("quad-sphere", 18_000, 0).triangulate().unwrap().mesh;
     let uv = Semantic::TexCoord(0);
     // The surface of every chart, with the uvs of its triangles.
-    let mut charts: BTreeMap<(i32, i32), (Vec<[u32; 3]>, Vec<[[f64; 2]; 3]>)> = BTreeMap::new();
+    let mut charts: BTreeMap<(i32, i32), Chart> = BTreeMap::new();
     for c in corners(&input) {
         let uvs = c.map(|(_, w)| get::<2>(&input, w, &uv));
         let entry = charts.entry(chart(uvs[0])).or_default();
@@ -216,7 +219,7 @@ fn parts(m: &Mesh, keep: impl Fn(EdgeId) -> bool) -> usize {
 
 #[test]
 fn borders_between_materials_and_groups_are_not_torn() {
-    let ball = sample("sphere", 8000, 0);
+    let ball = sample("sphere", 40_000, 0);
     let t = ball.topology();
     let octant = |p: DVec3| (p.x > 0.1) as u32 + 2 * (p.y > -0.05) as u32 + 4 * (p.z > 0.2) as u32;
     let regions: Vec<u32> = t
