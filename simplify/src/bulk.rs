@@ -13,8 +13,8 @@ use glam::DVec3;
 use progmesh_aif::{Bits, EdgeId, Marks};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// Edges taken into a round, as a share of the collapses still to do. Decided on bunny, horse, igea, fandisk, rangemap and dragon: up to 2
-/// their rms stays within 2 % of the exact schedule's, and each halving costs a fifth of the time at 50 %.
+/// Edges taken into a round, as a share of the collapses still to do. Decided on bunny, horse, rangemap and dragon: at 2
+/// their rms stays within 2 % of the exact schedule's; 1 takes about a fifth more time at 50 %.
 const SHARE: f64 = 2.0;
 /// The dearest edge of a round costs at most this many times the one at a quarter of it: where costs jump, as between the planes and the
 /// edges of CAD parts, the round ends. Decided on fandisk.

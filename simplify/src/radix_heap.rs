@@ -9,19 +9,18 @@ pub(crate) struct RadixHeap {
     /// Bucket b holds the keys whose highest bit that differs from `last` is b - 1; bucket 0 those equal to it.
     buckets: Vec<Vec<u64>>,
     last: u64,
-    len: usize,
 }
 
 impl RadixHeap {
     /// Nothing in it.
     pub(crate) fn new() -> Self {
-        RadixHeap { buckets: vec![Vec::new(); 65], last: 0, len: 0 }
+        RadixHeap { buckets: vec![Vec::new(); 65], last: 0 }
     }
 
     /// Number of keys.
     #[cfg(test)]
     pub(crate) fn len(&self) -> usize {
-        self.len
+        self.buckets.iter().map(Vec::len).sum()
     }
 
     /// Adds a key that is not below the last popped.
@@ -29,14 +28,12 @@ impl RadixHeap {
     pub(crate) fn push(&mut self, key: u64) {
         debug_assert!(key >= self.last);
         self.buckets[64 - (key ^ self.last).leading_zeros() as usize].push(key);
-        self.len += 1;
     }
 
     /// Takes the least key.
     #[inline]
     pub(crate) fn pop(&mut self) -> Option<u64> {
         if let Some(key) = self.buckets[0].pop() {
-            self.len -= 1;
             return Some(key);
         }
         let b = self.buckets.iter().position(|b| !b.is_empty())?;
@@ -47,7 +44,6 @@ impl RadixHeap {
         }
         bucket.clear();
         self.buckets[b] = bucket;
-        self.len -= 1;
         self.buckets[0].pop()
     }
 }
