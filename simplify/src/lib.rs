@@ -14,6 +14,7 @@ mod collapser;
 mod exact;
 mod finish;
 mod locks;
+pub mod measure;
 pub mod nsa;
 mod options;
 mod parallel;

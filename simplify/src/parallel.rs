@@ -56,3 +56,40 @@ pub(crate) fn with_threads<R: Send>(threads: Option<usize>, f: impl FnOnce() -> 
     let _ = threads;
     f()
 }
+
+/// Calls `f` on every chunk with its first index.
+pub(crate) fn for_chunks<T: Send>(items: &mut [T], size: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
+    #[cfg(feature = "parallel")]
+    if items.len() > size && rayon::current_num_threads() > 1 {
+        return items.par_chunks_mut(size).enumerate().for_each(|(i, chunk)| f(i * size, chunk));
+    }
+    items.chunks_mut(size).enumerate().for_each(|(i, chunk)| f(i * size, chunk));
+}
+
+/// Calls both, at the same time if it is `worth` it.
+pub(crate) fn join<A: Send, B: Send>(
+    worth: bool,
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    #[cfg(feature = "parallel")]
+    if worth && rayon::current_num_threads() > 1 {
+        return rayon::join(a, b);
+    }
+    let _ = worth;
+    (a(), b())
+}
+
+/// `f(0)`, `f(1)`, ... `f(n - 1)`, each with a scratch value of its thread; results in order.
+pub(crate) fn map_init<S, R: Send>(
+    n: usize,
+    init: impl Fn() -> S + Sync + Send,
+    f: impl Fn(&mut S, usize) -> R + Sync + Send,
+) -> Vec<R> {
+    #[cfg(feature = "parallel")]
+    if n > 1 && rayon::current_num_threads() > 1 {
+        return (0..n).into_par_iter().map_init(init, f).collect();
+    }
+    let mut scratch = init();
+    (0..n).map(|i| f(&mut scratch, i)).collect()
+}

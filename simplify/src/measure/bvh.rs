@@ -1,0 +1,147 @@
+//! A bounding volume hierarchy of four children a node, without pointers.
+//!
+//! Triangles are put into an order (`order`) in which every run of 4, 16, 64, ... beginning at a multiple of its length lies close together;
+//! node `i` of a level has children `4 i .. 4 i + 4` of the level below. The order comes from splitting at the box's longest side, always
+//! at a multiple of the children's size (overlap-minimising top-down packing after Lee & Lee 2003). Boxes are f32, rounded outwards,
+//! one `Vec4` a bound for all four children: a query tests four boxes with six subtractions. 32 B a triangle, in a few
+//! cache lines along a path.
+
+use glam::{DVec3, Vec4};
+
+/// Boxes of four children, one in every lane; a missing child has an empty box.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    pub(super) lo: [Vec4; 3],
+    pub(super) hi: [Vec4; 3],
+}
+
+const EMPTY: Node = Node { lo: [Vec4::INFINITY; 3], hi: [Vec4::NEG_INFINITY; 3] };
+
+impl Node {
+    /// The box around all children, as bounds.
+    fn hull(&self) -> ([f32; 3], [f32; 3]) {
+        (self.lo.map(Vec4::min_element), self.hi.map(Vec4::max_element))
+    }
+
+    fn set(&mut self, lane: usize, (lo, hi): ([f32; 3], [f32; 3])) {
+        for k in 0..3 {
+            self.lo[k][lane] = lo[k];
+            self.hi[k][lane] = hi[k];
+        }
+    }
+}
+
+/// The hierarchy over triangles `0..n`.
+#[derive(Clone, Debug)]
+pub(super) struct Bvh {
+    /// Levels one after the other, leaves first, the root last.
+    pub(super) nodes: Vec<Node>,
+    /// Where each level begins in `nodes`.
+    pub(super) base: Vec<u32>,
+}
+
+/// A triangle while it is being sorted.
+#[derive(Clone, Copy)]
+struct Item {
+    at: [f32; 3],
+    id: u32,
+}
+
+/// From this many triangles on, both halves of a split are sorted at the same time. Also the size of the chunks in which boxes are made.
+const PARALLEL: usize = 1 << 13;
+
+/// The order of the triangles, given their centres. O(n log n).
+pub(super) fn order(centres: Vec<[f32; 3]>) -> Vec<u32> {
+    let mut items: Vec<Item> =
+        centres.into_iter().enumerate().map(|(id, at)| Item { at, id: id as u32 }).collect();
+    let mut span = 1;
+    while span < items.len() {
+        span *= 4;
+    }
+    split(&mut items, span / 4);
+    items.into_iter().map(|i| i.id).collect()
+}
+
+/// Orders `items`, which lie below one node whose children take `span` each.
+fn split(items: &mut [Item], span: usize) {
+    if span == 0 || items.len() <= 1 {
+        return;
+    }
+    if items.len() <= span {
+        return split(items, span / 4);
+    }
+    let children = items.len().div_ceil(span);
+    let at = children / 2 * span;
+    let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for i in items.iter() {
+        for k in 0..3 {
+            lo[k] = lo[k].min(i.at[k]);
+            hi[k] = hi[k].max(i.at[k]);
+        }
+    }
+    let side = |k: usize| hi[k] - lo[k];
+    let axis = if side(0) >= side(1) && side(0) >= side(2) {
+        0
+    } else if side(1) >= side(2) {
+        1
+    } else {
+        2
+    };
+    // A total order, so that the halves do not depend on how the selection goes about it.
+    items.select_nth_unstable_by(at, |x, y| x.at[axis].total_cmp(&y.at[axis]).then(x.id.cmp(&y.id)));
+    let (left, right) = items.split_at_mut(at);
+    crate::parallel::join(left.len() >= PARALLEL, || split(left, span), || split(right, span));
+}
+
+impl Bvh {
+    /// The hierarchy over `n` triangles in order, from their boxes. Not for `n` = 0. O(n).
+    pub(super) fn new(n: usize, bounds: impl Fn(usize) -> ([f32; 3], [f32; 3]) + Sync + Send) -> Self {
+        let (mut base, mut total, mut count) = (Vec::new(), 0, n);
+        loop {
+            count = count.div_ceil(4);
+            base.push(total as u32);
+            total += count;
+            if count <= 1 {
+                break;
+            }
+        }
+        let mut nodes = vec![EMPTY; total];
+        let mut below = n;
+        for level in 0..base.len() {
+            let (done, rest) = nodes.split_at_mut(base[level] as usize);
+            let count = below.div_ceil(4);
+            let children = level.checked_sub(1).map(|l| &done[base[l] as usize..]);
+            crate::parallel::for_chunks(&mut rest[..count], PARALLEL / 4, |first, chunk| {
+                for (i, node) in chunk.iter_mut().enumerate() {
+                    let child = 4 * (first + i);
+                    for c in child..below.min(child + 4) {
+                        node.set(c - child, children.map_or_else(|| bounds(c), |n| n[c].hull()));
+                    }
+                }
+            });
+            below = count;
+        }
+        Bvh { nodes, base }
+    }
+}
+
+/// The least f32 not below `x` and the greatest not above it, in this order of use: `down(x) <= x <= up(x)`.
+#[inline]
+pub(super) fn down(x: f64) -> f32 {
+    let y = x as f32;
+    if y as f64 > x { y.next_down() } else { y }
+}
+
+/// The least f32 not below `x`.
+#[inline]
+pub(super) fn up(x: f64) -> f32 {
+    let y = x as f32;
+    if (y as f64) < x { y.next_up() } else { y }
+}
+
+/// The box around a triangle, rounded outwards.
+#[inline]
+pub(super) fn bounds_of([a, b, c]: [DVec3; 3]) -> ([f32; 3], [f32; 3]) {
+    let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
+    (lo.to_array().map(down), hi.to_array().map(up))
+}

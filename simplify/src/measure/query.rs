@@ -1,0 +1,235 @@
+//! The closest point of a surface, found through its hierarchy.
+
+use super::bvh::{Node, down, up};
+use super::surface::Surface;
+use super::triangle::{self, Foot};
+use glam::{DVec3, Vec4};
+
+/// The point of a surface closest to a given one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ClosestPoint {
+    /// The triangle it lies on, by its index in the input; where several are equally near, one of them.
+    pub triangle: u32,
+    /// Weights of the triangle's corners; none negative, their sum 1.
+    pub bary: [f64; 3],
+    /// The point.
+    pub point: DVec3,
+    /// How far it is.
+    pub distance: f64,
+}
+
+/// What a search has found: a triangle of the hierarchy and the foot on it, in local units.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Best {
+    pub(super) triangle: u32,
+    pub(super) foot: Foot,
+}
+
+/// Asks a surface for its closest points, one after the other.
+///
+/// A query starts from the triangle that the last one found: points in an order in which neighbours follow each other are several times
+/// faster than points in random order. Answers do not depend on the order but for the choice among triangles that are equally near (to
+/// rounding).
+#[derive(Clone, Debug)]
+pub struct Query<'a> {
+    surface: &'a Surface,
+    last: u32,
+}
+
+/// Beyond this many radii of the surface, f32 no longer tells its boxes apart.
+const FAR: f64 = 16.0;
+/// Room for the nodes that wait: at most 3 on each of 16 levels, and 4.
+const STACK: usize = 64;
+
+impl Surface {
+    /// A cursor for closest-point queries.
+    pub fn query(&self) -> Query<'_> {
+        Query { surface: self, last: 0 }
+    }
+}
+
+impl<'a> Query<'a> {
+    /// The point of the surface closest to `p`. O(log n) for points near the surface; NaN for a `p` that is not finite.
+    pub fn closest(&mut self, p: DVec3) -> ClosestPoint {
+        let best = self.nearest(self.surface.frame.local(p));
+        self.surface.closest_point(best)
+    }
+
+    /// The distance of `p` from the surface, as [`Query::closest`] has it.
+    pub fn distance(&mut self, p: DVec3) -> f64 {
+        self.nearest(self.surface.frame.local(p)).foot.d2.sqrt() / self.surface.frame.scale
+    }
+
+    /// The closest point to a local one.
+    #[inline]
+    pub(super) fn nearest(&mut self, p: DVec3) -> Best {
+        let s = self.surface;
+        if !p.is_finite() {
+            return Best { triangle: self.last, foot: Foot { d2: f64::NAN, v: 0.0, w: 0.0 } };
+        }
+        let mut best =
+            Best { triangle: self.last, foot: triangle::closest(s.corners(self.last as usize), p) };
+        if p.abs().max_element() < FAR {
+            s.search_near(p, &mut best);
+        } else {
+            s.search_far(p, &mut best);
+        }
+        self.last = best.triangle;
+        best
+    }
+}
+
+/// A node that waits: a lower bound of the squared distance, its level, its index.
+#[derive(Clone, Copy, Default)]
+struct Waiting {
+    d2: f32,
+    level: u32,
+    node: u32,
+}
+
+/// A bound for f32 lower bounds of the squared distance: one that is greater cannot lead to less than `d2`.
+///
+/// Lower bounds come from boxes and points that are rounded outwards, so only the arithmetic counts: 7 roundings of 2^-24 each, and the 2
+/// bits that carry the lane: 2^-20 covers them.
+#[inline]
+fn ceiling(d2: f64) -> f32 {
+    (d2 * (1.0 + 1e-6)) as f32 * (1.0 + f32::EPSILON) + f32::MIN_POSITIVE
+}
+
+impl Surface {
+    pub(super) fn closest_point(&self, best: Best) -> ClosestPoint {
+        let Foot { d2, v, w } = best.foot;
+        let [a, b, c] = self.corners(best.triangle as usize);
+        ClosestPoint {
+            triangle: self.ids[best.triangle as usize],
+            bary: [(1.0 - v - w).max(0.0), v, w],
+            point: self.frame.world(a + (b - a) * v + (c - a) * w),
+            distance: d2.sqrt() / self.frame.scale,
+        }
+    }
+
+    #[inline]
+    fn try_triangle(&self, t: u32, p: DVec3, best: &mut Best) -> bool {
+        let foot = triangle::closest(self.corners(t as usize), p);
+        let better = foot.d2 < best.foot.d2;
+        if better {
+            *best = Best { triangle: t, foot };
+        }
+        better
+    }
+
+    /// Lowers `best` to the nearest triangle. Boxes are tested in f32, conservatively; triangles in f64.
+    fn search_near(&self, p: DVec3, best: &mut Best) {
+        let (lo, hi) = (p.to_array().map(down).map(Vec4::splat), p.to_array().map(up).map(Vec4::splat));
+        let bvh = &self.bvh;
+        let mut limit = ceiling(best.foot.d2);
+        let mut stack = [Waiting::default(); STACK];
+        let mut waiting = 0;
+        let mut level = bvh.base.len() - 1;
+        let mut node = bvh.base[level];
+        loop {
+            let mut keys = keys(&bvh.nodes[node as usize], &lo, &hi, limit);
+            let first = 4 * (node - bvh.base[level]);
+            sort(&mut keys);
+            if level == 0 {
+                for key in keys {
+                    if f32::from_bits(key & !3) > limit || key == u32::MAX {
+                        break;
+                    }
+                    if self.try_triangle(first + (key & 3), p, best) {
+                        limit = ceiling(best.foot.d2);
+                    }
+                }
+            } else if keys[0] != u32::MAX {
+                let below = bvh.base[level - 1] + first;
+                for &key in keys[1..].iter().rev().filter(|&&k| k != u32::MAX) {
+                    stack[waiting] = Waiting {
+                        d2: f32::from_bits(key & !3),
+                        level: level as u32 - 1,
+                        node: below + (key & 3),
+                    };
+                    waiting += 1;
+                }
+                (level, node) = (level - 1, below + (keys[0] & 3));
+                continue;
+            }
+            loop {
+                if waiting == 0 {
+                    return;
+                }
+                waiting -= 1;
+                let w = stack[waiting];
+                if w.d2 <= limit {
+                    (level, node) = (w.level as usize, w.node);
+                    break;
+                }
+            }
+        }
+    }
+
+    /// The same for points far out, wholly in f64.
+    #[cold]
+    fn search_far(&self, p: DVec3, best: &mut Best) {
+        let bvh = &self.bvh;
+        let root = bvh.base.len() - 1;
+        let mut stack = vec![(0.0, root, bvh.base[root])];
+        while let Some((d2, level, node)) = stack.pop() {
+            if d2 > best.foot.d2 {
+                continue;
+            }
+            let n = &bvh.nodes[node as usize];
+            let first = 4 * (node - bvh.base[level]);
+            let mut found: [(f64, u32); 4] = std::array::from_fn(|lane| {
+                let away = |k: usize| {
+                    let (lo, hi) = (f64::from(n.lo[k][lane]), f64::from(n.hi[k][lane]));
+                    (lo - p[k]).max(p[k] - hi).max(0.0)
+                };
+                let d = DVec3::new(away(0), away(1), away(2));
+                // Rounding, as in `ceiling`.
+                (d.length_squared() * (1.0 - 1e-14), lane as u32)
+            });
+            found.sort_unstable_by(|x, y| y.0.total_cmp(&x.0));
+            // Farthest first, so that the nearest lies on top; for triangles the other way round.
+            if level > 0 {
+                let below = bvh.base[level - 1] + first;
+                let near = found.iter().filter(|f| f.0 <= best.foot.d2 && f.0 < f64::INFINITY);
+                stack.extend(near.map(|&(d2, lane)| (d2, level - 1, below + lane)));
+            } else {
+                for &(d2, lane) in found.iter().rev() {
+                    if d2 <= best.foot.d2 && d2 < f64::INFINITY {
+                        self.try_triangle(first + lane, p, best);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Squared distances of the four boxes from the point between `lo` and `hi`, as ordered bits with the lane in the lowest two; `u32::MAX`
+/// for those beyond `limit`.
+#[inline]
+fn keys(n: &Node, lo: &[Vec4; 3], hi: &[Vec4; 3], limit: f32) -> [u32; 4] {
+    let away = |k: usize| (n.lo[k] - hi[k]).max(lo[k] - n.hi[k]).max(Vec4::ZERO);
+    let (x, y, z) = (away(0), away(1), away(2));
+    let d2 = x * x + y * y + z * z;
+    let d2 = d2.to_array();
+    std::array::from_fn(|lane| {
+        if d2[lane] <= limit && d2[lane] < f32::INFINITY {
+            d2[lane].to_bits() & !3 | lane as u32
+        } else {
+            u32::MAX
+        }
+    })
+}
+
+/// Sorts four numbers.
+#[inline]
+fn sort(k: &mut [u32; 4]) {
+    let mut order = |i: usize, j: usize| (k[i], k[j]) = (k[i].min(k[j]), k[i].max(k[j]));
+    order(0, 1);
+    order(2, 3);
+    order(0, 2);
+    order(1, 3);
+    order(1, 2);
+}
