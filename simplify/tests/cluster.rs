@@ -125,12 +125,37 @@ fn of_target_and_bound_the_first_ends_it() {
 }
 
 #[test]
-fn without_a_target_nothing_is_left() {
+fn a_mesh_never_vanishes() {
+    // Without a target, and with one too small for any grid: the coarsest that leaves something.
+    for target in [None, Some(0), Some(1), Some(3)] {
+        let mut m = sample("sphere", 320, 0);
+        let out = run(&mut m, |o| o.triangles = target);
+        assert_eq!(out.stop, Stop::NoLegalCollapse, "{target:?}");
+        assert!(out.faces_out > target.unwrap_or(0) && out.faces_out < 30, "{}", out.faces_out);
+    }
+    // A bound under which all would fall together.
     let mut m = sample("sphere", 320, 0);
-    let out = run(&mut m, |_| {});
-    assert_eq!((out.faces_out, out.vertices_out, out.stop), (0, 0, Stop::NoLegalCollapse));
+    let out = run(&mut m, |o| o.max_error = Some(MaxError { value: 100.0, relative: false }));
+    assert_eq!(out.stop, Stop::NoLegalCollapse);
+    assert!(out.faces_out > 0 && out.faces_out < 30, "{}", out.faces_out);
+    // Faces that no grid leaves.
+    let flat = vec![[0.0f32; 3], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
+    let mut m = Mesh::from_polygons(flat, &[3], &[0, 1, 2]).unwrap();
+    let out = run(&mut m, |o| o.triangles = Some(0));
+    assert_eq!((out.faces_out, out.stop), (1, Stop::NoLegalCollapse));
     let out = run(&mut Mesh::default(), |o| o.triangles = Some(10));
     assert_eq!((out.faces_out, out.stop), (0, Stop::Target));
+}
+
+#[test]
+fn a_bound_below_all_edges_changes_nothing() {
+    for value in [0.0, 1e-9, 1e-4] {
+        let input = sample("sphere", 320, 0);
+        let mut m = input.clone();
+        let out = run(&mut m, |o| o.max_error = Some(MaxError { value, relative: false }));
+        assert_eq!((out.faces_out, out.stop), (320, Stop::Error), "{value}");
+        assert!(out.estimate <= value.min(1e-12), "{value}: {}", out.estimate);
+    }
 }
 
 #[test]
@@ -260,8 +285,10 @@ proptest! {
         let want = (ratio * input.triangle_count() as f64).round() as usize;
         let mut m = input.clone();
         let out = run(&mut m, |o| (o.ratio, o.placement) = (Some(ratio), Some(placement)));
-        prop_assert_eq!(out.stop, Stop::Target);
-        prop_assert!(out.triangles_out <= want);
+        // Too few for any grid: the coarsest that leaves something.
+        prop_assert_eq!(out.stop == Stop::Target, out.triangles_out <= want);
+        prop_assert!(out.triangles_out <= want.max(60), "{} of {}", out.triangles_out, want);
+        prop_assert!(out.triangles_out > 0);
         // Inside the bounds, and no triangle twice.
         let (lo, hi) = input.bounds().unwrap();
         let slack = 1e-5 * (hi - lo).length();
