@@ -42,6 +42,8 @@ pub(crate) struct Collapser<'m> {
     pub(crate) worst: f64,
     /// Costs per weight may not pass this, local units.
     pub(crate) bound: f64,
+    /// The error bound in model units.
+    largest: f64,
     /// The bound forbade the rounded place of a candidate.
     pub(crate) bounded: bool,
     pub(crate) tried: u64,
@@ -71,14 +73,15 @@ pub(crate) enum Refusal {
 }
 
 impl<'m> Collapser<'m> {
-    /// Fills the quadrics. O(n).
-    pub(crate) fn new(mut work: Work<'m>, options: &Options) -> Self {
+    /// Fills the quadrics. A model unit is `world` world units. O(n).
+    pub(crate) fn new(mut work: Work<'m>, options: &Options, world: f64) -> Self {
         let placement = match options.keep_vertices {
             true => Placement::Endpoint,
             false => options.placement.unwrap_or(Placement::Optimal),
         };
         let quadrics = fill_quadrics(&work, options);
-        let bound = options.max_error.map_or(f64::INFINITY, |b| work.local_bound_squared(b));
+        let largest = options.max_error.map_or(f64::INFINITY, |b| work.model_bound(b, world));
+        let bound = (largest * work.scale).powi(2);
         let wedges = WedgeMerge::new(&mut work);
         Collapser {
             work,
@@ -86,6 +89,7 @@ impl<'m> Collapser<'m> {
             placement,
             worst: 0.0,
             bound,
+            largest,
             bounded: false,
             tried: 0,
             refused: Refused::default(),
@@ -203,13 +207,13 @@ impl<'m> Collapser<'m> {
             if !to.is_finite() {
                 return Err(Refusal::Flip);
             }
-            // Far from the origin rounding may cost more than the collapse.
-            if self.bound < f64::INFINITY && to != c.to {
-                let origin = points[kept.index()];
-                let q = self.joint_quadric(c.roles);
-                if q.at(to - origin) > self.bound * q.weight {
-                    return Err(Refusal::Error);
-                }
+        }
+        // Rounding the place may cost more than the collapse, and the cost itself is rounded in another way from another origin: what
+        // counts is what `collapse` will find.
+        if self.bound < f64::INFINITY {
+            let q = self.joint_quadric(c.roles);
+            if q.at(to - points[kept.index()]) > self.bound * q.weight {
+                return Err(Refusal::Error);
             }
         }
         // A kept vertex that does not move changes none of its own faces.
@@ -222,10 +226,11 @@ impl<'m> Collapser<'m> {
 
     fn collapse(&mut self, e: EdgeId, c: &Candidate, to: DVec3) {
         let k = c.roles.kept.index();
-        let q = self.joint_quadric(c.roles).moved(to - self.work.points[k]);
+        let (q, step) = (self.joint_quadric(c.roles), to - self.work.points[k]);
         if q.weight > 0.0 {
-            self.worst = self.worst.max(q.at(DVec3::ZERO) / q.weight);
+            self.worst = self.worst.max(q.at(step) / q.weight);
         }
+        let q = q.moved(step);
         self.wedges.merge(&mut self.work, e, &c.roles, to);
         self.quadrics[k] = q;
         self.work.perform(e, &c.roles, to);
@@ -238,9 +243,10 @@ impl<'m> Collapser<'m> {
         self.quadrics[k].plus(&self.quadrics[r].moved(self.work.points[k] - self.work.points[r]))
     }
 
-    /// Estimated error so far, model units: the root of the largest cost per weight.
+    /// Estimated error so far, model units: the root of the largest cost per weight. Never above the bound.
     pub(crate) fn estimate(&self) -> f64 {
-        self.worst.sqrt() / self.work.scale
+        // A cost at the bound may have a root a rounding above it.
+        (self.worst.sqrt() / self.work.scale).min(self.largest)
     }
 
     /// True if a candidate of this cost respects the error bound.

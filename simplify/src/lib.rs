@@ -51,7 +51,8 @@ pub fn simplify(mesh: &mut Mesh, options: &Options, control: &dyn Control) -> Re
     Ok(outcomes.swap_remove(0))
 }
 
-/// Simplifies several meshes to one shared target: errors of mesh `i` weigh `scales[i]` (model units to world units).
+/// Simplifies several meshes to one shared target: errors of mesh `i` weigh `scales[i]` (model units to world units). An error bound
+/// that is not relative is in world units; a relative one is relative to each mesh's own diagonal.
 ///
 /// Options by vertex (locks, weights) are those of every mesh: give them for one mesh at a time. Panics if `scales` has another length
 /// than `meshes`.
@@ -77,7 +78,7 @@ pub fn simplify_all(
         }
     }
     let mut outcomes = match options.method {
-        Method::Nsa => nsa::simplify_all(meshes, &options, control),
+        Method::Nsa => nsa::simplify_all(meshes, scales, &options, control),
         Method::Quadric => quadric_collapse::simplify_all(meshes, scales, &options, control),
         Method::Cluster => cluster::simplify_all(meshes, scales, &options, control),
     }?;

@@ -80,7 +80,8 @@ pub fn run(
     control: &dyn Control,
 ) -> Result<Run, SimplifyError> {
     let target = target(options, mesh.triangle_count());
-    let (stop, mut done) = run_all(std::slice::from_mut(mesh), options, target, Some(recorder), control)?;
+    let (stop, mut done) =
+        run_all(std::slice::from_mut(mesh), &[1.0], options, target, Some(recorder), control)?;
     let (levels, estimate) = done.pop().unwrap_or_default();
     Ok(Run { stop, estimate, levels })
 }
@@ -88,12 +89,13 @@ pub fn run(
 /// [`crate::simplify_all`] by this method.
 pub(crate) fn simplify_all(
     meshes: &mut [Mesh],
+    scales: &[f64],
     options: &Options,
     control: &dyn Control,
 ) -> Result<Vec<Outcome>, SimplifyError> {
     let before: Vec<Before> = meshes.iter().map(Before::of).collect();
     let target = target(options, before.iter().map(|b| b.triangles).sum());
-    let (stop, done) = run_all(meshes, options, target, None, control)?;
+    let (stop, done) = run_all(meshes, scales, options, target, None, control)?;
     let each = meshes.iter_mut().zip(&before).zip(done);
     Ok(each.map(|((m, b), (levels, estimate))| finish(m, b, options, (stop, estimate, levels))).collect())
 }
@@ -104,6 +106,7 @@ pub(crate) type Done = (Vec<Level>, f64);
 /// Runs all meshes pass by pass until `target` triangles are left over all of them. Meshes are not compacted.
 pub(crate) fn run_all(
     meshes: &mut [Mesh],
+    scales: &[f64],
     options: &Options,
     target: usize,
     mut recorder: Option<&mut dyn Recorder>,
@@ -115,8 +118,8 @@ pub(crate) fn run_all(
     }
     // Nothing may be changed before all options are known to be good.
     let mut engines = Vec::with_capacity(meshes.len());
-    for mesh in meshes.iter_mut() {
-        engines.push(Engine::new(mesh, options, epsilon)?);
+    for (mesh, &scale) in meshes.iter_mut().zip(scales) {
+        engines.push(Engine::new(mesh, options, epsilon, scale)?);
     }
     for engine in &mut engines {
         engine.begin(&mut recorder);

@@ -21,8 +21,8 @@ pub(crate) fn simplify_all(
     let total = before.iter().map(|b| b.triangles).sum();
     let cut = meshes.iter_mut().map(triangulate).collect::<Result<Vec<_>, _>>()?;
     let mut collapsers = Vec::with_capacity(meshes.len());
-    for mesh in meshes.iter_mut() {
-        collapsers.push(Collapser::new(Work::new(mesh, options)?, options));
+    for (mesh, &scale) in meshes.iter_mut().zip(scales) {
+        collapsers.push(Collapser::new(Work::new(mesh, options)?, options, scale));
     }
     // Costs are areas times squared distances; common ones are in diagonals of the largest mesh, in world units.
     let largest = collapsers.iter().zip(scales).map(|(c, s)| c.work.diagonal * s).fold(0.0, f64::max);

@@ -74,10 +74,13 @@ impl<'m> Work<'m> {
         Ok(work)
     }
 
-    /// The error bound in local units, squared.
-    pub(crate) fn local_bound_squared(&self, bound: MaxError) -> f64 {
-        let model = if bound.relative { bound.value * self.diagonal } else { bound.value };
-        (model * self.scale).powi(2)
+    /// The error bound in model units, of which one is `world` world units.
+    pub(crate) fn model_bound(&self, bound: MaxError, world: f64) -> f64 {
+        match bound.relative {
+            true => bound.value * self.diagonal,
+            false if world > 0.0 => bound.value / world,
+            false => bound.value,
+        }
     }
 
     /// What every vertex may do.

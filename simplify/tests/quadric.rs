@@ -169,8 +169,7 @@ proptest! {
             (o.schedule, o.placement) = (Some(schedule), Some(placement));
             o.max_error = Some(MaxError { value: bound, relative: false });
         });
-        // The last digits: rounded to f32, and the quadric moved to its new origin.
-        prop_assert!(out.estimate <= bound * (1.0 + 1e-6), "{} > {bound}", out.estimate);
+        prop_assert!(out.estimate <= bound, "{} > {bound}", out.estimate);
         prop_assert!(matches!(out.stop, Stop::Error | Stop::NoLegalCollapse));
     }
 }
@@ -221,6 +220,42 @@ fn cad_parts_lose_what_is_planar_first() {
         };
         let rms = rms(&m, &input) / size;
         assert!(rms < 1e-6, "{s:?}: {rms}");
+    }
+}
+
+#[test]
+fn a_bound_of_zero_allows_what_costs_nothing() {
+    for (name, s, p) in ["cad", "sphere", "scan", "terrain", "offset-1e4"]
+        .into_iter()
+        .flat_map(|n| SCHEDULES.into_iter().flat_map(move |s| PLACEMENTS.map(|p| (n, s, p))))
+    {
+        let mut m = sample(name, 3000, 0);
+        let out = run(&mut m, |o| {
+            (o.schedule, o.placement) = (Some(s), Some(p));
+            o.max_error = Some(MaxError { value: 0.0, relative: false });
+        });
+        assert_eq!((out.estimate, out.stop), (0.0, Stop::Error), "{name} {s:?} {p:?}");
+        // Only the block has planes.
+        assert_eq!(out.faces_out < out.faces_in, name == "cad", "{name} {s:?} {p:?}: {}", out.faces_out);
+    }
+}
+
+#[test]
+fn a_bound_is_in_world_units() {
+    for method in [Method::Quadric, Method::Nsa, Method::Cluster] {
+        let with = |value: f64, scale: f64| {
+            let mut meshes = [sample("sphere", 5000, 0)];
+            let mut o = Options::default();
+            o.method = method;
+            o.epsilon = Some(40.0).filter(|_| method == Method::Nsa);
+            o.max_error = Some(MaxError { value, relative: false });
+            let out = simplify_all(&mut meshes, &[scale], &o, &Quiet).unwrap();
+            assert!(out[0].estimate * scale <= value * (1.0 + 1e-9), "{method:?}: {}", out[0].estimate);
+            assert_eq!(out[0].stop, Stop::Error, "{method:?}");
+            out[0].faces_out
+        };
+        assert_eq!(with(0.2, 1.0), with(0.2 * 128.0, 128.0), "{method:?}");
+        assert!(with(0.2, 1.0) < with(0.2, 4.0), "{method:?}");
     }
 }
 

@@ -107,7 +107,8 @@ impl<'m> Source<'m> {
 
     /// Edge of the cells whose diagonal is this bound, in world units.
     pub(super) fn cell_for(&self, bound: MaxError) -> f64 {
-        self.work.local_bound_squared(bound).sqrt() / 3f64.sqrt() / self.local
+        let world = self.work.scale / self.local;
+        self.work.model_bound(bound, world) * world / 3f64.sqrt()
     }
 
     /// Puts every vertex into a cell of this edge (world units). O(n).

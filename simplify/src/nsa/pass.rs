@@ -62,13 +62,18 @@ enum Refusal {
 }
 
 impl<'m> Engine<'m> {
-    /// Works out what may move. Changes nothing. O(n).
-    pub(super) fn new(mesh: &'m mut Mesh, options: &Options, epsilon: f64) -> Result<Self, SimplifyError> {
+    /// Works out what may move. A model unit is `world` world units. Changes nothing. O(n).
+    pub(super) fn new(
+        mesh: &'m mut Mesh,
+        options: &Options,
+        epsilon: f64,
+        world: f64,
+    ) -> Result<Self, SimplifyError> {
         let mut own = options.clone();
         own.lock_border = true;
         let work = Work::new(mesh, &own)?;
         let slots = work.points.len();
-        let bound = own.max_error.map_or(f64::INFINITY, |b| work.local_bound_squared(b).sqrt());
+        let bound = own.max_error.map_or(f64::INFINITY, |b| work.model_bound(b, world) * work.scale);
         let placement = match own.keep_vertices {
             true => Placement::Endpoint,
             false => own.placement.unwrap_or(Placement::Midpoint),
