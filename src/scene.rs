@@ -148,6 +148,32 @@ impl Scene {
         world
     }
 
+    /// How often each mesh is shown: by how many nodes below the roots. Once, where there are no nodes at all. O(nodes).
+    pub fn instance_counts(&self) -> Vec<usize> {
+        if self.nodes.is_empty() {
+            return vec![1; self.meshes.len()];
+        }
+        let mut counts = vec![0; self.meshes.len()];
+        let mut seen = vec![false; self.nodes.len()];
+        let mut stack = self.roots.clone();
+        while let Some(n) = stack.pop() {
+            let Some(node) = self.nodes.get(n) else { continue };
+            if std::mem::replace(&mut seen[n], true) {
+                continue;
+            }
+            if let Some(count) = node.mesh.and_then(|m| counts.get_mut(m)) {
+                *count += 1;
+            }
+            stack.extend(&node.children);
+        }
+        counts
+    }
+
+    /// Triangles of all instances: what is drawn.
+    pub fn instanced_triangles(&self) -> usize {
+        self.meshes.iter().zip(self.instance_counts()).map(|(m, n)| m.triangles().saturating_mul(n)).sum()
+    }
+
     /// Triangles of all unique meshes: a polygon of n corners counts n - 2.
     pub fn unique_triangles(&self) -> usize {
         self.meshes.iter().map(|m| m.triangles()).sum()

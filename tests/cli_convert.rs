@@ -77,6 +77,130 @@ fn materials_textures_and_uvs_go_to_gltf_and_back() {
     assert_eq!(lines("in.obj"), lines("b.obj"));
 }
 
+const MTL: &str = "newmtl brick
+Ka 0.1 0.2 0.3
+Kd 0.5 0.25 0.125
+Ks 0.9 0.8 0.7
+Ns 250
+d 0.5
+illum 2
+map_Kd my brick.png
+map_Ks shine/gloss.png
+bump -bm 0.5 bumps.png
+
+newmtl plain
+Kd 1 0 0
+Ka 1 1 1
+
+";
+
+/// A square of two materials with textures.
+fn textured(p: &Place) {
+    p.generate("quad-sphere", "sphere.obj", 24);
+    let png = p.read("charts.png");
+    for file in ["in/my brick.png", "in/shine/gloss.png", "in/bumps.png"] {
+        p.write(file, &png);
+    }
+    p.write("in/in.mtl", MTL);
+    p.write(
+        "in/in.obj",
+        "mtllib in.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
+         usemtl brick\nf 1/1 2/2 3/3\nusemtl plain\nf 1/1 3/3 4/4\n",
+    );
+}
+
+#[test]
+fn materials_survive_the_way_through_gltf_as_they_were_written() {
+    let p = Place::new();
+    textured(&p);
+    for (format, folder) in [("glb", "glb"), ("gltf", "gltf")] {
+        for folder in [folder.to_string(), format!("{folder}/back")] {
+            std::fs::create_dir(p.path(&folder)).unwrap();
+        }
+        let middle = format!("{folder}/middle.{format}");
+        let there = p.done(&format!("convert in/in.obj {middle}"));
+        assert!(!there.stderr.contains("warning"), "{}", there.stderr);
+        let back = p.done(&format!("convert {middle} {folder}/back/in.obj"));
+        assert!(!back.stderr.contains("warning"), "{}", back.stderr);
+        assert_eq!(p.text(&format!("{folder}/back/in.mtl")), MTL, "{format}");
+        for file in ["my brick.png", "shine/gloss.png", "bumps.png"] {
+            assert_eq!(p.read(&format!("{folder}/back/{file}")), p.read(&format!("in/{file}")), "{format}");
+        }
+        // Simplified too, and through glTF twice.
+        p.done(&format!("simplify {middle} {folder}/again.{format} --ratio 1"));
+        p.done(&format!("convert {folder}/again.{format} {folder}/again.obj"));
+        assert_eq!(p.text(&format!("{folder}/again.mtl")), MTL, "{format}");
+    }
+}
+
+#[test]
+fn a_material_changed_in_gltf_is_written_as_it_is_now() {
+    let p = Place::new();
+    textured(&p);
+    p.done("convert in/in.obj middle.gltf");
+    let mut document: serde_json::Value = serde_json::from_str(&p.text("middle.gltf")).unwrap();
+    document["materials"][1]["pbrMetallicRoughness"]["baseColorFactor"] = json!([0.0, 1.0, 0.0, 1.0]);
+    document["materials"][0]["pbrMetallicRoughness"].as_object_mut().unwrap().remove("baseColorTexture");
+    p.write("middle.gltf", document.to_string());
+    p.done("convert middle.gltf back.obj");
+    let mtl = p.text("back.mtl");
+    assert!(
+        mtl.contains("newmtl plain\nKd 0 1 0\n") && !mtl.contains("Ka") && !mtl.contains("map_Kd"),
+        "{mtl}"
+    );
+}
+
+#[test]
+fn nodes_and_groups_that_nobody_made_are_not_missed() {
+    let p = Place::new();
+    p.generate("cad", "in.glb", 300);
+    for out in ["a.obj", "a.ply", "a.off", "a.stl"] {
+        let run = p.done(&format!("convert in.glb {out}"));
+        assert!(!run.stderr.contains("node") && !run.stderr.contains("group"), "{out}: {}", run.stderr);
+    }
+    // A single node that places its mesh: the place is kept, so nothing is lost.
+    p.generate("sphere", "one.gltf", 80);
+    let placed = p.text("one.gltf").replacen("\"mesh\": 0", "\"mesh\": 0, \"translation\": [5, 0, 0]", 1);
+    p.write("one.gltf", placed);
+    let run = p.done("convert one.gltf one.obj");
+    assert_eq!(run.stderr, "");
+    assert_eq!(p.info("one.obj")["bounds"], json!([[4.0, -1.0, -1.0], [6.0, 1.0, 1.0]]));
+    // Groups that somebody named are.
+    p.write("g.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\ng a\nf 1 2 3\ng b\nf 1 3 4\n");
+    for (out, text) in [("g.ply", "groups"), ("g.off", "groups"), ("g.stl", "groups"), ("g.glb", "groups")] {
+        let run = p.done(&format!("convert g.obj {out}"));
+        assert!(run.stderr.contains(text), "{out}: {}", run.stderr);
+    }
+}
+
+#[test]
+fn text_where_there_is_no_choice_is_said() {
+    let p = Place::new();
+    p.generate("sphere", "in.ply", 80);
+    for (out, text) in [
+        ("a.obj", "always text"),
+        ("a.gltf", "always text"),
+        ("a.off", "always text"),
+        ("a.glb", "always binary"),
+    ] {
+        for run in [
+            p.done(&format!("convert in.ply {out} --text")),
+            p.done(&format!("simplify in.ply {out} --ratio 0.5 --text")),
+            p.done(&format!("generate sphere {out} --faces 20 --text")),
+        ] {
+            assert!(
+                run.stderr.contains(&format!("warning: {out}: --text changes nothing: ")),
+                "{}",
+                run.stderr
+            );
+            assert!(run.stderr.contains(text), "{}", run.stderr);
+        }
+    }
+    for out in ["a.ply", "a.stl"] {
+        assert!(!p.done(&format!("convert in.ply {out} --text")).stderr.contains("--text"));
+    }
+}
+
 #[test]
 fn what_a_format_cannot_hold_is_said_once() {
     let p = Place::new();

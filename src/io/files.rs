@@ -81,6 +81,8 @@ impl WriteError {
 
 /// Reads a mesh file, by the name's extension if `format` is `None`. `-` is standard input, and needs a format.
 pub fn read(path: &Path, format: Option<Format>) -> Result<Loaded, ReadError> {
+    // That there is no such file, or that it is a directory, matters more than its name.
+    check_source(path).map_err(ReadError::Io)?;
     let format =
         format.or_else(|| Format::from_name(&path.to_string_lossy())).ok_or(ReadError::UnknownFormat)?;
     let bytes = read_bytes(path).map_err(ReadError::Io)?;
@@ -124,10 +126,44 @@ fn read_bytes(path: &Path) -> io::Result<Vec<u8>> {
         io::stdin().lock().read_to_end(&mut bytes)?;
         return Ok(bytes);
     }
-    if fs::metadata(path)?.is_dir() {
-        return Err(io::Error::new(ErrorKind::IsADirectory, "is a directory"));
-    }
     fs::read(path)
+}
+
+/// Fails where `path` cannot be a file to read.
+fn check_source(path: &Path) -> io::Result<()> {
+    if !is_dash(path) && fs::metadata(path)?.is_dir() {
+        return Err(is_a_directory());
+    }
+    Ok(())
+}
+
+fn is_a_directory() -> io::Error {
+    io::Error::new(ErrorKind::IsADirectory, "is a directory")
+}
+
+/// Fails where no file can be written at `path`: there is no directory for it, or a directory in its place. So that a long run need
+/// not end with that.
+///
+/// No guarantee: permissions and space are found out when writing.
+pub fn check_target(path: &Path) -> io::Result<()> {
+    if is_dash(path) {
+        return Ok(());
+    }
+    let directory = directory_of(path);
+    if path.is_dir() {
+        return Err(is_a_directory());
+    }
+    match fs::metadata(directory) {
+        Ok(m) if m.is_dir() => Ok(()),
+        Ok(_) => Err(io::Error::new(
+            ErrorKind::NotADirectory,
+            format!("{} is not a directory", directory.display()),
+        )),
+        Err(e) if e.kind() == ErrorKind::NotFound => {
+            Err(io::Error::new(e.kind(), format!("there is no directory {}", directory.display())))
+        }
+        Err(e) => Err(e),
+    }
 }
 
 /// Files in the directory of an input, and below it.
@@ -245,6 +281,7 @@ pub fn write(
             }
         });
     }
+    check_target(path).map_err(at(path))?;
     let directory = directory_of(path);
     let mut staged = Vec::with_capacity(encoded.side.len() + 1);
     for (name, bytes) in &encoded.side {
@@ -266,9 +303,9 @@ pub fn write(
     Ok(vec![])
 }
 
-/// Writes one file of text or bytes, all or nothing; its directory is made.
+/// Writes one file of text or bytes, all or nothing. Its directory must be there.
 pub fn write_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    fs::create_dir_all(directory_of(path))?;
+    check_target(path)?;
     Staged::write(path, bytes)?.publish()
 }
 
@@ -293,7 +330,7 @@ impl Staged {
         let target = fs::canonicalize(target).unwrap_or_else(|_| target.to_path_buf());
         let existing = fs::metadata(&target).ok();
         if existing.as_ref().is_some_and(|m| m.is_dir()) {
-            return Err(io::Error::new(ErrorKind::IsADirectory, "is a directory"));
+            return Err(is_a_directory());
         }
         if existing.as_ref().is_some_and(|m| !m.is_file()) {
             OpenOptions::new().write(true).open(&target)?.write_all(bytes)?;

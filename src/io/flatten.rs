@@ -64,7 +64,8 @@ fn place<'a>(scene: &'a Scene, format: &str) -> Flat<'a> {
     if shown.iter().any(|&n| n > 1) {
         warnings.push(format!("{format} has no instances: each is written as a mesh of its own"));
     }
-    if instances.iter().any(|i| i.matrix != DMat4::IDENTITY) {
+    // Of a single node nothing is lost: where its mesh stands is kept.
+    if scene.nodes.len() > 1 && instances.iter().any(|i| i.matrix != DMat4::IDENTITY) {
         warnings.push(format!("{format} has no nodes: their transforms are applied to the vertices"));
     }
     if let [only] = &instances[..]
@@ -108,6 +109,35 @@ fn instances<'a>(scene: &'a Scene) -> Vec<Instance<'a>> {
         stack.extend(node.children.iter().rev());
     }
     list
+}
+
+/// True if the faces that are in use are divided into groups that somebody named, or that a name other than the mesh's would be lost.
+/// The primitives of a glTF mesh are no such groups: they are its materials.
+pub(crate) fn has_named_groups(geometry: &MeshInput, groups: &[Group], name: Option<&str>) -> bool {
+    let mut kinds = BTreeSet::new();
+    let mut used = vec![false; groups.len()];
+    for &g in &geometry.face_group {
+        match used.get_mut(g as usize) {
+            Some(seen) if *seen => continue,
+            Some(seen) => *seen = true,
+            None => {}
+        }
+        let none = (None, &[][..], None);
+        kinds.insert(
+            groups
+                .get(g as usize)
+                .map_or(none, |g| (g.object.as_deref(), &g.names[..], g.smoothing.as_deref())),
+        );
+        if kinds.len() > 1 {
+            return true;
+        }
+    }
+    kinds.iter().any(|&(object, names, smoothing)| {
+        let of_object = object.is_none() || object == name;
+        !(of_object
+            && (names.is_empty() || names.len() == 1 && Some(names[0].as_str()) == name)
+            && smoothing.is_none())
+    })
 }
 
 /// How a transform acts on points and on normals.

@@ -15,4 +15,4 @@ mod write;
 pub use read::decode;
 pub use write::encode;
 
-pub(crate) use mtl::{image_names, mime_of};
+pub(crate) use mtl::{base_texture, image_names, material_of, mime_of};

@@ -51,6 +51,7 @@ pub fn decode(bytes: &[u8], side: &dyn Side) -> Result<Decoded, DecodeError> {
         scene.materials.push(images::material(&root, material, image_count)?);
     }
     scene.images = images::images(&root, &store, side, &mut warnings)?;
+    images::check_textures(&mut scene.materials, &scene.images);
     let meshes = root.list("meshes")?;
     let mut notes = vertices::Notes::default();
     for mesh in &meshes {

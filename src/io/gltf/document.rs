@@ -5,7 +5,7 @@ use super::geometry::{self, Shape};
 use super::{images, semantic};
 use crate::aif::Positions;
 use crate::io::EncodeError;
-use crate::io::flatten::turn_v_over;
+use crate::io::flatten::{has_named_groups, turn_v_over};
 use crate::scene::{Material, Node, Scene, SceneMesh};
 use glam::{DMat4, DVec3};
 use serde_json::{Map, Value, json};
@@ -20,7 +20,7 @@ pub(super) fn build(scene: &Scene, writer: &mut Writer) -> Result<Value, EncodeE
     let mut meshes: Vec<Value> = Vec::new();
     let mut placed: Vec<Option<(usize, DVec3)>> = Vec::new();
     for mesh in &scene.meshes {
-        if mesh.groups.iter().any(|g| g.object.is_some() || !g.names.is_empty() || g.smoothing.is_some()) {
+        if has_named_groups(&mesh.geometry, &mesh.groups, mesh.name.as_deref()) {
             writer.warn("glTF has no groups inside a mesh: their names were left out".into());
         }
         let (mesh, offset) = prepare(mesh, writer);
@@ -185,6 +185,9 @@ fn material(m: &Material, textures: &images::Textures, strong: &mut bool) -> Val
     }
     if m.double_sided {
         json.insert("doubleSided".into(), json!(true));
+    }
+    if let Some(mtl) = m.mtl.as_deref().filter(|t| !t.is_empty()) {
+        json.insert("extras".into(), json!({images::MTL: mtl}));
     }
     Value::Object(json)
 }

@@ -4,9 +4,12 @@ use super::accessor::Store;
 use super::container::{data_uri, is_remote, load, percent};
 use super::encode::{Writer, percent_encode};
 use super::json::{At, array_of};
-use crate::io::{DecodeError, Side};
+use crate::io::{DecodeError, Side, obj};
 use crate::scene::{Image, Material, Scene};
 use serde_json::{Map, Value, json};
+
+/// Where a material's MTL statements are kept in its `extras`, so that OBJ can be written again as it was.
+pub(super) const MTL: &str = "mtl";
 
 /// The part of a material that a scene holds.
 pub(super) fn material(root: &At<'_>, at: &At<'_>, images: usize) -> Result<Material, DecodeError> {
@@ -26,7 +29,7 @@ pub(super) fn material(root: &At<'_>, at: &At<'_>, images: usize) -> Result<Mate
         Some(t) => image_of(root, &t, images)?,
         None => None,
     };
-    Ok(Material {
+    let mut material = Material {
         name: at.name().unwrap_or_default(),
         base_color: color.map_or([1.0; 4], |c| c.map(|x| x as f32)),
         base_color_image: base_image,
@@ -36,7 +39,34 @@ pub(super) fn material(root: &At<'_>, at: &At<'_>, images: usize) -> Result<Mate
         emissive: emissive.map(|x| (x * strength) as f32),
         double_sided: at.get("doubleSided").is_some_and(|v| v.value.as_bool() == Some(true)),
         mtl: None,
-    })
+    };
+    let statements =
+        at.get("extras").and_then(|e| e.get(MTL)).and_then(|m| m.value.as_str().map(String::from));
+    material.mtl = statements.filter(|text| still_says(text, &material));
+    Ok(material)
+}
+
+/// Forgets MTL statements that name another texture than the document does.
+pub(super) fn check_textures(materials: &mut [Material], images: &[Image]) {
+    for m in materials {
+        let Some(file) = m.mtl.as_deref().map(obj::base_texture) else { continue };
+        let named = |i: &Image| file.is_some() && (i.name.as_deref() == file || i.uri.as_deref() == file);
+        // One that glTF cannot hold was left out when the file was written.
+        if images.iter().position(named) != m.base_color_image {
+            m.mtl = None;
+        }
+    }
+}
+
+/// True if MTL statements say of a material what its document says: nobody has changed it since they were kept.
+fn still_says(mtl: &str, material: &Material) -> bool {
+    let said = obj::material_of(mtl);
+    let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * a.abs().max(1.0);
+    let unit = |x: f32| x.clamp(0.0, 1.0);
+    said.base_color.iter().zip(material.base_color).all(|(&a, b)| near(unit(a), b))
+        && said.emissive.iter().zip(material.emissive).all(|(&a, b)| near(a.max(0.0), b))
+        && near(said.metallic, material.metallic)
+        && near(said.roughness, material.roughness)
 }
 
 /// The image of a texture reference: the texture's own, or one in a format that an extension adds.
@@ -78,7 +108,9 @@ pub(super) fn images(
                     image.data = Some(data);
                 }
                 None => {
-                    image.uri = Some(text.to_string());
+                    // As a path; the document keeps it as it is written.
+                    let path = || String::from_utf8_lossy(&percent(text)).into_owned();
+                    image.uri = Some(if is_remote(text) { text.to_string() } else { path() });
                     match load(side, text) {
                         Ok(data) => {
                             store.budget.take(data.len(), &at.path)?;
@@ -129,7 +161,8 @@ pub(super) fn embed(scene: &Scene, writer: &mut Writer) -> Textures {
     for (i, image) in scene.images.iter().enumerate() {
         let label = image.uri.as_deref().or(image.name.as_deref()).map_or(format!("image {i}"), String::from);
         let mut json = Map::new();
-        if let Some(name) = &image.name {
+        // A file's name is kept, for the formats that write images beside them.
+        if let Some(name) = image.name.as_ref().or(image.uri.as_ref().filter(|u| !u.starts_with("data:"))) {
             json.insert("name".into(), json!(name));
         }
         match (&image.data, image.data.as_deref().and_then(sniff)) {

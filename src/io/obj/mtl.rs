@@ -5,6 +5,17 @@ use crate::scene::{Image, Material};
 use std::borrow::Cow;
 use std::fmt::Write;
 
+/// What MTL statements say of a material, its textures apart.
+pub(crate) fn material_of(statements: &str) -> Material {
+    Library::default().material(String::new(), statements.to_string(), "", "", &crate::io::NoSide)
+}
+
+/// The file that MTL statements name for the base colour.
+pub(crate) fn base_texture(statements: &str) -> Option<&str> {
+    let named = |line| texture(line).filter(|t| t.0.eq_ignore_ascii_case("map_kd")).map(|t| t.1);
+    statements.lines().filter_map(named).next_back()
+}
+
 /// Materials and images gathered from all `mtllib` of a file.
 #[derive(Default)]
 pub(super) struct Library {
@@ -277,8 +288,11 @@ fn write_raw(out: &mut String, raw: &str, images: &[Image], names: &[String]) {
         raw.split(['\n', '\r']).map(str::trim).filter(|l| !l.is_empty() && split_word(l).0 != "newmtl")
     {
         let renamed = texture(line).and_then(|(_, file)| {
-            let i =
-                images.iter().position(|image| image.data.is_some() && image.uri.as_deref() == Some(file))?;
+            // The file's name, or what is left of it where the image lay inside a file of another format.
+            let is = |name: &Option<String>| name.as_deref() == Some(file);
+            let i = images
+                .iter()
+                .position(|image| image.data.is_some() && (is(&image.uri) || is(&image.name)))?;
             Some(format!("{}{}", &line[..line.len() - file.len()], names[i]))
         });
         out.push_str(renamed.as_deref().unwrap_or(line));

@@ -1,7 +1,7 @@
 //! Writing OFF: text, with `C` and `N` where every vertex has one colour or normal.
 
 use crate::aif::{Encoding, MeshInput, NONE, Positions, Semantic};
-use crate::io::flatten::flatten;
+use crate::io::flatten::{Flat, flatten, has_named_groups};
 use crate::io::text::{f64_mark, write_f32, write_f64, write_f64_long};
 use crate::io::{EncodeError, EncodeOptions, Encoded, Format};
 use crate::scene::Scene;
@@ -34,7 +34,7 @@ pub fn encode(scene: &Scene, _: &EncodeOptions) -> Result<Encoded, EncodeError> 
     let face_colors = if vertex_colors.is_some() { None } else { color.and_then(|k| per_face(g, k)) };
     say_lost(
         scene,
-        g,
+        &flat,
         [normals.is_some(), uvs.is_some(), vertex_colors.is_some() || face_colors.is_some()],
         &mut warnings,
     );
@@ -183,7 +183,8 @@ fn shared_or_absent(
 }
 
 /// Says what is not in the file.
-fn say_lost(scene: &Scene, g: &MeshInput, [normals, uvs, colors]: [bool; 3], warnings: &mut Vec<String>) {
+fn say_lost(scene: &Scene, flat: &Flat<'_>, [normals, uvs, colors]: [bool; 3], warnings: &mut Vec<String>) {
+    let g = &*flat.geometry;
     let mut lost: Vec<&str> = Vec::new();
     for c in g.wedges.iter().flat_map(|w| w.channels()) {
         match c.semantic {
@@ -197,7 +198,7 @@ fn say_lost(scene: &Scene, g: &MeshInput, [normals, uvs, colors]: [bool; 3], war
     if !scene.materials.is_empty() && g.face_material.iter().any(|&m| m != NONE) {
         lost.push("materials");
     }
-    if g.face_group.iter().any(|&x| x != NONE) {
+    if has_named_groups(g, &flat.groups, flat.name) {
         lost.push("groups");
     }
     lost.dedup();

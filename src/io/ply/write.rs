@@ -1,7 +1,7 @@
 //! Writing PLY.
 
 use crate::aif::{Encoding, MeshInput, NONE, Positions, Semantic, Wedges};
-use crate::io::flatten::flatten;
+use crate::io::flatten::{flatten, has_named_groups};
 use crate::io::obj::image_names;
 use crate::io::text::{f64_mark, write_f32, write_f64, write_f64_long};
 use crate::io::{EncodeError, EncodeOptions, Encoded};
@@ -18,7 +18,7 @@ pub fn encode(scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeE
     let mut encoded = Encoded { warnings: flat.warnings, ..Default::default() };
     let warnings = &mut encoded.warnings;
     let input: &MeshInput = &flat.geometry;
-    if input.face_group.iter().any(|&g| g != NONE) {
+    if has_named_groups(input, &flat.groups, flat.name) {
         warnings.push("PLY cannot hold groups".into());
     }
     let stem = if options.stem.is_empty() { "mesh" } else { &options.stem };

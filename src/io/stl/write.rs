@@ -3,7 +3,7 @@
 use super::{FACET, HEADER};
 use crate::aif::triangulate_polygon;
 use crate::aif::{MeshInput, NONE, Positions, Semantic};
-use crate::io::flatten::{Flat, flatten};
+use crate::io::flatten::{Flat, flatten, has_named_groups};
 use crate::io::text::{f64_mark, write_f32, write_f64, write_f64_long};
 use crate::io::{EncodeError, EncodeOptions, Encoded, Format};
 use crate::scene::Scene;
@@ -153,7 +153,7 @@ fn binary(flat: &Flat<'_>, facets: &[Facet], warnings: &mut Vec<String>) -> Resu
     if narrowed {
         warnings.push("binary STL is single precision: coordinates are rounded from f64 to f32".into());
     }
-    if flat.groups.len() > 1 && flat.geometry.face_group.iter().any(|&g| g != NONE) {
+    if has_named_groups(&flat.geometry, &flat.groups, flat.name) {
         warnings.push("binary STL has no groups: they are left out (text STL has solids)".into());
     }
     Ok(out)
