@@ -9,10 +9,11 @@ use crate::simplify::{self, Control, Level, Options, Outcome, Refused, SimplifyE
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+mod least;
 mod locks;
 mod scale;
 
-pub use scale::world_scales;
+pub use scale::{world_bounds, world_scales};
 
 /// What to do with a scene. Start from `Job::default()` and set what differs.
 #[derive(Clone, Debug, Default)]
@@ -53,6 +54,9 @@ pub struct Summary {
     pub triangles_out: usize,
     /// The number of triangles asked for, if one was.
     pub target: Option<usize>,
+    /// The fewest triangles that surfaces of the result's topology can have, 4 a closed component and more where it has handles;
+    /// 0 unless the target was missed. A lower bound: there need not be such a mesh.
+    pub least_triangles: usize,
     /// Vertices after.
     pub vertices_out: usize,
     /// Why it ended.
@@ -209,6 +213,9 @@ pub fn simplify_scene(
         }
         outcomes = simplify::simplify_all(&mut meshes, &scales, &options, control)?;
     }
+    let triangles_out: usize = outcomes.iter().map(|o| o.triangles_out).sum();
+    let missed = target.is_some_and(|t| triangles_out > t);
+    let least_triangles = if missed { meshes.iter().map(least::triangles).sum() } else { 0 };
     for (i, mesh) in meshes.into_iter().enumerate() {
         if cfg!(debug_assertions) {
             mesh.check().map_err(|source| JobError::Broken { mesh: label(&scene, i), source })?;
@@ -228,13 +235,13 @@ pub fn simplify_scene(
     if isolated > 0 {
         warnings.push(format!("{isolated} vertices without a face were left out"));
     }
-    let triangles_out = outcomes.iter().map(|o| o.triangles_out).sum();
     let summary = Summary {
         faces_in,
         faces_out: outcomes.iter().map(|o| o.faces_out).sum(),
         triangles_in,
         triangles_out,
         target,
+        least_triangles,
         vertices_out: outcomes.iter().map(|o| o.vertices_out).sum(),
         stop: common_stop(&outcomes, target.is_some_and(|t| triangles_out <= t)),
         estimate: outcomes.iter().zip(&scales).map(|(o, s)| o.estimate * s).fold(0.0, f64::max),
@@ -310,6 +317,7 @@ pub fn count(n: usize, what: &str) -> String {
     match (n, what) {
         (1, _) => format!("1 {what}"),
         (_, "vertex") => format!("{n} vertices"),
+        (_, "mesh") => format!("{n} meshes"),
         _ => format!("{n} {what}s"),
     }
 }

@@ -37,10 +37,23 @@ fn the_size_is_about_what_was_asked_for() {
 }
 
 #[test]
+fn a_size_that_a_shape_does_not_have_is_said() {
+    let p = Place::new();
+    let run = p.done("generate sphere m.obj --faces 1");
+    assert!(
+        run.stderr.contains("20 faces (1 asked for: this mesh has no size nearer to that)"),
+        "{}",
+        run.stderr
+    );
+    assert!(!p.done("generate torus m.obj --faces 2e3").stderr.contains("asked for"));
+}
+
+#[test]
 fn wrong_usage_is_exit_code_2_and_writes_nothing() {
     let p = Place::new();
     p.run("generate teapot m.obj").failed(2, "\"teapot\"");
     p.run("generate sphere m.obj --faces 60000000").failed(2, "at most");
+    p.run("generate sphere m.obj --faces 0").failed(2, "1 or more");
     p.run("generate sphere m.xyz").failed(2, "--to");
     p.run("generate sphere").failed(2, "OUT");
     p.run("generate").failed(2, "NAME");

@@ -101,12 +101,113 @@ fn double_precision_is_told_from_single() {
 }
 
 #[test]
+fn what_building_leaves_out_is_counted() {
+    let p = Place::new();
+    p.write("in.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\nf 1 2 2\n");
+    let i = p.info("in.obj");
+    let m = &i["meshes"][0];
+    assert_eq!((&m["file_faces"], &m["faces"], &m["file_triangles"]), (&json!(3), &json!(2), &json!(3)));
+    assert_eq!(i["triangles"], json!({"file": 3, "built": 2, "instanced": 3}));
+    let text = p.done("info in.obj").stdout;
+    assert!(text.contains("in the file  3 faces; 1 left out, see below"), "{text}");
+    assert!(text.contains("1 face with fewer than three distinct vertices"), "{text}");
+    // simplify counts what the file has, and says what was left out.
+    let run = p.done("simplify in.obj out.obj --ratio 1 --json");
+    let s = run.json();
+    assert_eq!((&s["faces_in"], &s["triangles"]["input"]), (&json!(3), &json!(3)));
+    assert!(run.stderr.contains("1 face with fewer than three distinct corners left out"), "{}", run.stderr);
+}
+
+/// A glTF file with `nodes` instead of its only one.
+fn with_nodes(p: &Place, nodes: &str, roots: &str) {
+    p.generate("sphere", "one.gltf", 320);
+    let mut document: serde_json::Value = serde_json::from_str(&p.text("one.gltf")).unwrap();
+    document["nodes"] = serde_json::from_str(nodes).unwrap();
+    document["scenes"][0]["nodes"] = serde_json::from_str(roots).unwrap();
+    p.write("many.gltf", document.to_string());
+}
+
+#[test]
+fn instances_are_told_from_what_the_file_holds() {
+    let p = Place::new();
+    with_nodes(
+        &p,
+        r#"[{"mesh": 0}, {"mesh": 0, "translation": [5, 0, 0]}, {"mesh": 0, "scale": [2, 2, 2]}]"#,
+        "[0, 1, 2]",
+    );
+    let i = p.info("many.gltf");
+    assert_eq!(i["triangles"], json!({"file": 320, "built": 320, "instanced": 960}));
+    assert_eq!(i["bounds"], json!([[-2.0, -2.0, -2.0], [6.0, 2.0, 2.0]]));
+    let text = p.done("info many.gltf").stdout;
+    assert!(
+        text.contains(
+            "1 mesh, 320 triangles in the file; 3 nodes, 3 of them showing a mesh: 960 triangles instanced"
+        ),
+        "{text}"
+    );
+    assert!(text.contains("bounds in the world, as the nodes place the meshes: -2 -2 -2 to 6 2 2"), "{text}");
+    let run = p.done("simplify many.gltf out.glb --ratio 0.5 --json");
+    assert!(
+        run.stderr.contains("in 1 mesh, each counted once (all instances: 960 -> 480 triangles)"),
+        "{}",
+        run.stderr
+    );
+    assert_eq!(
+        run.json()["triangles"],
+        json!({"input": 320, "output": 160, "instanced_input": 960, "instanced_output": 480})
+    );
+    // Where a mesh is shown once there is nothing to tell apart.
+    let run = p.done("simplify one.gltf out.glb --ratio 0.5");
+    assert!(!run.stderr.contains("instances"), "{}", run.stderr);
+    let text = p.done("info one.gltf").stdout;
+    assert!(!text.contains("instanced") && !text.contains("in the world"), "{text}");
+}
+
+#[test]
+fn bounds_before_and_after_a_node_are_both_explained() {
+    let p = Place::new();
+    with_nodes(&p, r#"[{"mesh": 0, "scale": [3, 3, 3]}]"#, "[0]");
+    let text = p.done("info many.gltf").stdout;
+    assert!(text.contains("in the world, as the nodes place the meshes: -3 -3 -3 to 3 3 3"), "{text}");
+    assert!(text.contains("bounds       -1 -1 -1 to 1 1 1"), "{text}");
+}
+
+#[test]
+fn a_material_without_a_name_has_a_number() {
+    let p = Place::new();
+    p.generate("cad", "in.gltf", 300);
+    let mut document: serde_json::Value = serde_json::from_str(&p.text("in.gltf")).unwrap();
+    for m in document["materials"].as_array_mut().unwrap() {
+        m.as_object_mut().unwrap().remove("name");
+    }
+    p.write("in.gltf", document.to_string());
+    let text = p.done("info in.gltf").stdout;
+    assert!(text.contains("\nmaterials: material 0, material 1"), "{text}");
+}
+
+#[test]
+fn a_directory_is_called_one() {
+    let p = Place::new();
+    p.write("place/x", "");
+    for arguments in
+        ["info place", "info place --from ply", "convert place out.obj", "simplify place out.obj --ratio 1"]
+    {
+        p.run(arguments).failed(3, "error: place: is a directory");
+    }
+    p.run("info none").failed(3, "error: none: ");
+    p.write("file", "");
+    p.run("info file").failed(2, "say its format with --from");
+    p.generate("sphere", "in.obj", 80);
+    p.run("convert in.obj place").failed(4, "error: place: is a directory");
+}
+
+#[test]
 fn bad_input_is_exit_code_3() {
     let p = Place::new();
     p.write("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\n");
     for flags in ["", "--check", "--json"] {
         let run = p.run(&format!("info bad.obj {flags}"));
-        run.failed(3, "progmesh: bad.obj: line 3");
+        run.failed(3, "error: bad.obj: line 3");
         assert_eq!(run.stdout, "");
     }
     p.run("info none.obj").failed(3, "none.obj: ");

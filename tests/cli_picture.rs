@@ -29,8 +29,8 @@ fn covered(png: &(usize, usize, Vec<[u8; 3]>), range: std::ops::Range<usize>) ->
 fn input_and_result_stand_side_by_side() {
     let p = Place::new();
     p.generate("torus", "in.obj", 4000);
-    p.done("simplify in.obj out.obj --ratio 0.25 --png new/both.png -q");
-    let both = decoded(p.read("new/both.png"));
+    p.done("simplify in.obj out.obj --ratio 0.25 --png both.png -q");
+    let both = decoded(p.read("both.png"));
     let half = both.0 / 2;
     let (left, right) = (covered(&both, 0..half), covered(&both, half..both.0));
     assert!(left.len() > half * both.1 / 10, "{}", left.len());
@@ -44,9 +44,9 @@ fn input_and_result_stand_side_by_side() {
     let shades = left.iter().filter(|&&(x, y)| color(x, y) != color(x + half, y)).count();
     assert!(shades > common / 4, "{shades} of {common}");
 
-    let first = p.read("new/both.png");
-    p.done("simplify in.obj out.obj --ratio 0.25 --png new/both.png -q --threads 1");
-    assert_eq!(p.read("new/both.png"), first);
+    let first = p.read("both.png");
+    p.done("simplify in.obj out.obj --ratio 0.25 --png both.png -q --threads 1");
+    assert_eq!(p.read("both.png"), first);
 }
 
 #[test]
@@ -77,17 +77,50 @@ fn wrong_use_and_failure_are_said() {
     p.generate("sphere", "in.obj", 80);
     p.run("info in.obj --wireframe").failed(2, "--png");
     p.run("info in.obj --png -").failed(2, "to a path");
+    p.run("info in.obj --png a.jpg").failed(2, "must end in .png");
+    p.run("simplify in.obj out.obj --ratio 0.5 --png a.jpeg").failed(2, "must end in .png");
     p.write("directory/x", "");
     p.run("info in.obj --png directory").failed(4, "directory");
     p.write("bad.off", "OFF\n1 1 0\n0 0 0\n3 0 1 2\n");
     p.run("info bad.off --png a.png").failed(3, "bad.off");
     assert!(!p.exists("a.png"));
     let before = p.files();
-    p.run("simplify in.obj out.obj --ratio 0.5 --png directory").failed(4, "directory");
-    assert_eq!(
-        p.files().len(),
-        before.len() + 1,
-        "the mesh is written, nothing else is left: {:?}",
-        p.files()
-    );
+    // Found out before the work, not after it; the picture's directory is not made, as the mesh's is not.
+    for png in ["directory", "none/a.png", "in.obj/a.png"] {
+        p.run(&format!("simplify in.obj out.obj --ratio 0.5 --png {png}"))
+            .failed(4, &format!("error: {png}: "));
+        p.run(&format!("info in.obj --png {png}")).failed(4, &format!("error: {png}: "));
+    }
+    p.run("info in.obj --png none/a.png").failed(4, "there is no directory none");
+    assert_eq!(p.files(), before);
+}
+
+#[test]
+fn the_caption_stands_below_the_mesh() {
+    let p = Place::new();
+    // A sheet that fills its view.
+    p.generate("cad", "in.obj", 500);
+    for mesh in ["in.obj", "tall.obj"] {
+        p.write("tall.obj", "v 0 0 0\nv 1 0 0\nv 1 9 0\nv 0 9 0\nf 1 2 3 4\n");
+        p.done(&format!("info {mesh} --png a.png -q"));
+        let (width, height, pixels) = decoded(p.read("a.png"));
+        let (above, below) = pixels.split_at(width * (height - 32));
+        assert!(below.iter().all(|c| [[255; 3], [64; 3]].contains(c)) && below.contains(&[64; 3]), "{mesh}");
+        assert!(!above.contains(&[64; 3]), "{mesh}");
+    }
+}
+
+#[test]
+fn drawing_is_in_the_times() {
+    let p = Place::new();
+    p.generate("sphere", "in.obj", 320);
+    let run = p.done("simplify in.obj out.obj --ratio 0.5 --png a.png --json");
+    let seconds = &run.json()["seconds"];
+    let of = |name: &str| seconds[name].as_f64().unwrap();
+    assert!(of("draw") > 0.0);
+    let parts = ["read", "build", "simplify", "write", "draw"].map(of).iter().sum::<f64>();
+    assert!(parts <= of("total") + 1e-3, "{seconds}");
+    assert!(run.stderr.contains(", draw 0."), "{}", run.stderr);
+    let run = p.done("simplify in.obj out.obj --ratio 0.5 --json");
+    assert!(!run.stderr.contains("draw") && run.json()["seconds"]["draw"] == 0.0);
 }

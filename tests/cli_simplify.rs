@@ -70,6 +70,7 @@ fn a_mesh_below_its_target_is_copied() {
 fn wrong_usage_is_exit_code_2() {
     let p = Place::new();
     p.generate("sphere", "in.obj", 80);
+    p.write("in.xyz", "");
     for (arguments, text) in [
         ("in.obj out.obj", "--ratio"),
         ("in.obj out.obj --ratio 1.5", "from 0 to 1"),
@@ -98,7 +99,7 @@ fn wrong_usage_is_exit_code_2() {
     ] {
         p.run(&format!("simplify {arguments}")).failed(2, text);
     }
-    assert_eq!(p.files(), ["in.obj"]);
+    assert_eq!(p.files(), ["in.obj", "in.xyz"]);
 }
 
 #[test]
@@ -106,10 +107,11 @@ fn an_unreadable_input_is_exit_code_3_and_an_unwritable_output_4() {
     let p = Place::new();
     p.generate("sphere", "in.obj", 80);
     p.write("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 x\n");
-    p.run("simplify none.obj out.obj --ratio 0.5").failed(3, "progmesh: none.obj: ");
+    p.run("simplify none.obj out.obj --ratio 0.5").failed(3, "error: none.obj: ");
     p.run("simplify . out.obj --from obj --ratio 0.5").failed(3, "directory");
-    p.run("simplify bad.obj out.obj --ratio 0.5").failed(3, "progmesh: bad.obj: line 3");
-    p.run("simplify in.obj none/out.obj --ratio 0.5").failed(4, "progmesh: none/out.obj: ");
+    p.run("simplify bad.obj out.obj --ratio 0.5").failed(3, "error: bad.obj: line 3");
+    p.run("simplify in.obj none/out.obj --ratio 0.5")
+        .failed(4, "error: none/out.obj: there is no directory none");
     p.write("out.obj/file", "");
     p.run("simplify in.obj out.obj --ratio 0.5").failed(4, "out.obj: is a directory");
     assert_eq!(p.files(), ["bad.obj", "in.obj", "out.obj"]);
@@ -328,6 +330,16 @@ fn help_has_examples_and_completions_and_man_pages_know_every_flag() {
     for flag in ["--max-error", "--lock-material", "--keep-vertices", "--normals", "--per-mesh"] {
         assert!(page.contains(flag) && script.contains(flag), "{flag}");
     }
+    for flag in [
+        "[--ratio R]",
+        "[--method nsa|quadric|cluster]",
+        "[--lock-material NAME|INDEX]...",
+        "[--weld[=EPS]]",
+        "IN OUT",
+    ] {
+        assert!(page.contains(flag), "{flag}: {page}");
+    }
+    assert!(page.contains("\"progmesh 0."), "{page}");
     assert!(p.exists("pages/progmesh.1") && p.exists("pages/progmesh-info.1"));
     p.run("completions tcsh").failed(2, "invalid value");
 }

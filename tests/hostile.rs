@@ -226,7 +226,7 @@ fn defined(p: &Place, file: &str, what: &str) {
             std::fs::remove_file(p.path("out.ply")).unwrap();
         }
         3 => {
-            assert!(run.stderr.starts_with(&format!("progmesh: {file}: ")), "{what}: {}", run.stderr);
+            assert!(run.stderr.starts_with(&format!("error: {file}: ")), "{what}: {}", run.stderr);
             assert!(!p.exists("out.ply"), "{what}");
         }
         code => panic!("{what}: exit code {code}: {}", run.stderr),
@@ -259,6 +259,6 @@ fn a_billion_announced_elements_allocate_nothing_large() {
         let out = shell.current_dir(p.directory()).args(["-c", &command]).output().unwrap();
         let stderr = String::from_utf8_lossy(&out.stderr);
         assert_eq!(out.status.code(), Some(3), "{file}: {stderr}");
-        assert!(stderr.starts_with(&format!("progmesh: {file}: ")), "{stderr}");
+        assert!(stderr.starts_with(&format!("error: {file}: ")), "{stderr}");
     }
 }

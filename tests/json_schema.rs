@@ -14,6 +14,7 @@ struct Simplify {
     faces_in: usize,
     faces_out: usize,
     vertices_out: usize,
+    triangles: Triangles,
     seconds: Seconds,
     stop: String,
     estimate: Option<f64>,
@@ -38,7 +39,25 @@ struct Seconds {
     build: f64,
     simplify: f64,
     write: f64,
+    draw: f64,
     total: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Triangles {
+    input: usize,
+    output: usize,
+    instanced_input: usize,
+    instanced_output: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InfoTriangles {
+    file: usize,
+    built: usize,
+    instanced: usize,
 }
 
 #[derive(Deserialize)]
@@ -79,6 +98,9 @@ struct Info {
     bytes: usize,
     nodes: usize,
     instances: usize,
+    triangles: InfoTriangles,
+    #[serde(deserialize_with = "present")]
+    bounds: Option<[[f64; 3]; 2]>,
     meshes: Vec<Mesh>,
     materials: Vec<String>,
     images: Vec<Image>,
@@ -92,6 +114,8 @@ struct Info {
 struct Mesh {
     #[serde(deserialize_with = "present")]
     name: Option<String>,
+    file_faces: usize,
+    file_triangles: usize,
     vertices: usize,
     edges: usize,
     faces: usize,

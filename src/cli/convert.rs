@@ -1,10 +1,10 @@
 //! `progmesh convert IN OUT`.
 
-use super::common::{self, FormatName, Shape, Warnings};
+use super::Failure;
+use super::args::{Input, Output, Shape};
+use super::common::Warnings;
 use super::control::Interrupt;
-use super::{Failure, common::name};
 use progmesh::pipeline::{JobError, Preparation, prepare};
-use std::path::PathBuf;
 
 /// Read a mesh and write it in another format, without simplifying it.
 ///
@@ -17,26 +17,15 @@ Examples:
   progmesh convert soup.obj whole.ply --weld=1e-6 --triangulate
   curl -s URL | progmesh convert - - --from obj --to glb > mesh.glb")]
 pub(crate) struct Args {
-    /// The mesh to read; - for standard input, with --from
-    #[arg(value_name = "IN")]
-    input: PathBuf,
-    /// The file to write; - for standard output, with --to
-    #[arg(value_name = "OUT")]
-    output: PathBuf,
-    /// Format of IN, instead of what its name says
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    from: Option<FormatName>,
-    /// Format of OUT, instead of what its name says
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    to: Option<FormatName>,
+    #[command(flatten)]
+    input: Input,
+    #[command(flatten)]
+    output: Output,
     #[command(flatten)]
     shape: Shape,
     /// Cut polygons into triangles
     #[arg(long)]
     triangulate: bool,
-    /// Write text where the format has text and binary (PLY, STL)
-    #[arg(long)]
-    text: bool,
     /// Say nothing but errors
     #[arg(long, short)]
     quiet: bool,
@@ -48,15 +37,14 @@ impl Args {
         how.weld = self.shape.weld();
         how.normals = self.shape.normals()?;
         how.triangulate = self.triangulate;
-        let format = common::output_format(&self.output, self.to)?;
-        let interrupt = Interrupt::watch();
         let mut warnings = Warnings::new(self.quiet);
-        let mut loaded = common::read(&self.input, self.from, &mut warnings)?;
+        let format = self.output.format(&mut warnings)?;
+        let interrupt = Interrupt::watch();
+        let mut scene = self.input.read(&mut warnings)?.decoded.scene;
         interrupt.be_graceful();
-        let file = name(&self.input, "standard input");
-        let said = prepare(&mut loaded.decoded.scene, &how)
-            .map_err(|e: JobError| Failure::Input(format!("{file}: {e}")))?;
+        let file = self.input.name();
+        let said = prepare(&mut scene, &how).map_err(|e: JobError| Failure::Input(format!("{file}: {e}")))?;
         warnings.say(said.into_iter().map(|w| format!("{file}: {w}")));
-        common::write(&self.output, format, self.text, &loaded.decoded.scene, &interrupt, &mut warnings)
+        self.output.write(format, &scene, &interrupt, &mut warnings)
     }
 }

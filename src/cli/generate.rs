@@ -1,7 +1,8 @@
 //! `progmesh generate NAME OUT`.
 
 use super::Failure;
-use super::common::{self, FormatName, Warnings, thousands};
+use super::args::{FormatName, Output, positive};
+use super::common::{self, Warnings, thousands};
 use super::control::Interrupt;
 use progmesh::meshes::{self, GenerateOptions};
 use progmesh::samples;
@@ -28,8 +29,8 @@ pub(crate) struct Args {
     /// List the meshes there are
     #[arg(long, exclusive = true)]
     list: bool,
-    /// About how many faces
-    #[arg(long, visible_alias = "size", value_name = "N")]
+    /// About how many faces; the shape's least number where that is more
+    #[arg(long, visible_alias = "size", value_name = "N", value_parser = positive, allow_negative_numbers = true)]
     faces: Option<usize>,
     /// Which of the many
     #[arg(long, value_name = "S", default_value_t = 0)]
@@ -50,19 +51,29 @@ impl Args {
         let (Some(name), Some(output)) = (&self.name, &self.output) else {
             return common::print(&list());
         };
-        let format = common::output_format(output, self.to)?;
+        let mut warnings = Warnings::new(self.quiet);
+        let output = Output::new(output.clone(), self.to, self.text);
+        let format = output.format(&mut warnings)?;
         let mut options = GenerateOptions::default().with_seed(self.seed);
         options.faces = self.faces;
         let sample = meshes::generate(name, &options).map_err(|e| Failure::Usage(e.to_string()))?;
-        let mut warnings = Warnings::new(self.quiet);
         let (vertices, faces) = (sample.positions.len(), sample.face_count());
         let scene = samples::scene(sample, name);
         let interrupt = Interrupt::watch();
         interrupt.be_graceful();
-        common::write(output, format, self.text, &scene, &interrupt, &mut warnings)?;
+        output.write(format, &scene, &interrupt, &mut warnings)?;
         if !self.quiet {
-            let file = common::name(output, "standard output");
-            common::note(&format!("{file}: {} vertices, {} faces", thousands(vertices), thousands(faces)));
+            // Shapes have sizes in steps, and a least one.
+            let far = self.faces.filter(|&n| faces.abs_diff(n) > n / 4);
+            let far = far.map_or(String::new(), |n| {
+                format!(" ({} asked for: this mesh has no size nearer to that)", thousands(n))
+            });
+            let file = output.name();
+            common::note(&format!(
+                "{file}: {} vertices, {} faces{far}",
+                thousands(vertices),
+                thousands(faces)
+            ));
         }
         Ok(())
     }

@@ -1,14 +1,15 @@
 //! `progmesh info IN`.
 
-use super::common::{self, FormatName, PictureArgs, Warnings, not_negative, short, thousands};
-use super::{Failure, common::name, problems};
+use super::args::{Input, not_negative, weld_rule};
+use super::common::{self, Warnings, short, thousands};
+use super::picture::PictureArgs;
+use super::{Failure, problems};
 use progmesh::aif::attributes::{Encoding, Semantic};
 use progmesh::aif::{BuildOptions, BuildReport, Mesh, NONE, Weld};
-use progmesh::pipeline::label;
+use progmesh::pipeline::{count, label, world_bounds};
 use progmesh::scene::Scene;
 use serde::Serialize;
 use std::fmt::Write;
-use std::path::PathBuf;
 
 /// Say what a mesh file holds: counts, kinds of vertices and edges, borders, components, genus, attributes, materials, problems.
 ///
@@ -25,12 +26,8 @@ Examples:
 --check ends with exit code 1 if a mesh breaks an invariant, and names the first. A file that holds no mesh at all (an index \
 out of range, a coordinate that is not a number) is invalid input: exit code 3, with or without --check.")]
 pub(crate) struct Args {
-    /// The mesh to read; - for standard input, with --from
-    #[arg(value_name = "IN")]
-    input: PathBuf,
-    /// Format of IN, instead of what its name says
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    from: Option<FormatName>,
+    #[command(flatten)]
+    input: Input,
     /// Look at the mesh with vertices at the same place, or within EPS model units, as one
     #[arg(long, value_name = "EPS", num_args = 0..=1, require_equals = true, default_missing_value = "0",
           value_parser = not_negative)]
@@ -52,15 +49,18 @@ impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let mut drawing = self.picture.drawing()?;
         let mut warnings = Warnings::new(self.quiet);
-        let loaded = common::read(&self.input, self.from, &mut warnings)?;
-        let file = name(&self.input, "standard input");
+        let loaded = self.input.read(&mut warnings)?;
+        let file = self.input.name();
         let mut scene = loaded.decoded.scene;
-        let options = BuildOptions::with_weld(common::weld_rule(self.weld));
+        let options = BuildOptions::with_weld(weld_rule(self.weld));
+        let (unique, instanced) = (scene.unique_triangles(), scene.instanced_triangles());
+        let world = world_bounds(&scene).map(|(low, high)| [low.to_array(), high.to_array()]);
         // Before the meshes are taken; what is wrong with one is said below, with its name.
         let drawn = drawing.as_mut().map(|d| d.add(&scene));
         let (mut meshes, mut broken) = (Vec::new(), None);
         for i in 0..scene.meshes.len() {
             let label = label(&scene, i);
+            let in_file = (scene.meshes[i].geometry.face_count(), scene.meshes[i].triangles());
             let input = std::mem::take(&mut scene.meshes[i].geometry);
             let raw = (self.check && options.weld != Weld::No).then(|| input.clone());
             let (mesh, report) =
@@ -72,10 +72,10 @@ impl Args {
                 let own = raw.as_ref().map_or(&report, |r| &r.1);
                 broken = first_broken(&mesh, own).map(|b| format!("{label}{b}"));
             }
-            meshes.push(MeshInfo::of(&scene, i, &mesh, &report));
+            meshes.push(MeshInfo::of(&scene, i, in_file, &mesh, &report));
         }
         drawn.transpose().map_err(|e| Failure::Input(format!("{file}: {e}")))?;
-        if let Some(d) = &drawing {
+        if let Some(d) = &mut drawing {
             d.write()?;
         }
         let info = Info {
@@ -84,6 +84,8 @@ impl Args {
             format: loaded.format.extension(),
             bytes: loaded.bytes,
             nodes: scene.nodes.len(),
+            triangles: Triangles { file: unique, built: meshes.iter().map(|m| m.triangles).sum(), instanced },
+            bounds: world,
             instances: scene.nodes.iter().filter(|n| n.mesh.is_some()).count(),
             meshes,
             materials: scene.materials.iter().map(|m| m.name.clone()).collect(),
@@ -132,6 +134,8 @@ struct Info {
     bytes: usize,
     nodes: usize,
     instances: usize,
+    triangles: Triangles,
+    bounds: Option<[[f64; 3]; 2]>,
     meshes: Vec<MeshInfo>,
     materials: Vec<String>,
     images: Vec<ImageInfo>,
@@ -139,9 +143,19 @@ struct Info {
     warnings: Vec<String>,
 }
 
+/// Triangles of the unique meshes, as the file has them and after building; those of all instances, as the file has them.
+#[derive(Serialize)]
+struct Triangles {
+    file: usize,
+    built: usize,
+    instanced: usize,
+}
+
 #[derive(Serialize)]
 struct MeshInfo {
     name: Option<String>,
+    file_faces: usize,
+    file_triangles: usize,
     vertices: usize,
     edges: usize,
     faces: usize,
@@ -214,7 +228,13 @@ struct ImageInfo {
 }
 
 impl MeshInfo {
-    fn of(scene: &Scene, i: usize, mesh: &Mesh, report: &BuildReport) -> Self {
+    fn of(
+        scene: &Scene,
+        i: usize,
+        (file_faces, file_triangles): (usize, usize),
+        mesh: &Mesh,
+        report: &BuildReport,
+    ) -> Self {
         let source = &scene.meshes[i];
         let t = mesh.topology();
         let kinds = t.count_kinds();
@@ -231,6 +251,8 @@ impl MeshInfo {
         let attributes = mesh.wedges().map_or(&[][..], |w| w.channels()).iter();
         MeshInfo {
             name: source.name.clone(),
+            file_faces,
+            file_triangles,
             vertices: mesh.vertex_count(),
             edges: t.edge_count(),
             faces: mesh.face_count(),
@@ -329,15 +351,30 @@ impl Info {
         let mut s = String::new();
         let _ = writeln!(s, "{}: {}, {} bytes", self.file, self.format, thousands(self.bytes));
         if self.nodes > 1 || self.meshes.len() != 1 {
-            let triangles = self.meshes.iter().map(|m| m.triangles).sum();
             let _ = writeln!(
                 s,
-                "{} meshes of {} triangles together; {} nodes, {} of them show a mesh",
-                self.meshes.len(),
-                thousands(triangles),
-                self.nodes,
-                self.instances
+                "{}, {} triangles in the file; {}, {} of them showing a mesh: {} triangles instanced",
+                count(self.meshes.len(), "mesh"),
+                thousands(self.triangles.file),
+                count(self.nodes, "node"),
+                self.instances,
+                thousands(self.triangles.instanced)
             );
+            if self.triangles.built != self.triangles.file {
+                let _ = writeln!(
+                    s,
+                    "{} triangles after building; what was left out is among each mesh's problems",
+                    thousands(self.triangles.built)
+                );
+            }
+        }
+        let own = match self.meshes.as_slice() {
+            [only] => only.bounds,
+            _ => None,
+        };
+        if let Some([low, high]) = self.bounds.filter(|b| Some(*b) != own) {
+            let _ =
+                writeln!(s, "bounds in the world, as the nodes place the meshes: {}", bounds_text(low, high));
         }
         for (i, m) in self.meshes.iter().enumerate() {
             let _ = match &m.name {
@@ -351,7 +388,10 @@ impl Info {
             }
         }
         if !self.materials.is_empty() {
-            let _ = writeln!(s, "\nmaterials: {}", some_of(self.materials.clone()));
+            let named =
+                |(i, m): (usize, &String)| if m.is_empty() { format!("material {i}") } else { m.clone() };
+            let names = self.materials.iter().enumerate().map(named).collect();
+            let _ = writeln!(s, "\nmaterials: {}", some_of(names));
         }
         for i in &self.images {
             let bytes = i.bytes.map_or("not found".into(), |b| format!("{} bytes", thousands(b)));
@@ -376,6 +416,13 @@ impl MeshInfo {
         let f = &self.face_sizes;
         let sizes = [(f.triangles, "triangles"), (f.quads, "quads"), (f.larger, "larger")];
         let _ = writeln!(s, "  faces        {}{}", n(self.faces), listed(&sizes));
+        if self.file_faces != self.faces {
+            let change = match self.file_faces.checked_sub(self.faces) {
+                Some(fewer) => format!("{} left out, see below", n(fewer)),
+                None => "some were split, see below".into(),
+            };
+            let _ = writeln!(s, "  in the file  {} faces; {change}", n(self.file_faces));
+        }
         let form = match (self.manifold, self.closed, self.orientable) {
             (true, true, true) => "closed surface",
             (true, true, false) => "closed surface, one-sided",
@@ -392,15 +439,7 @@ impl MeshInfo {
             self.euler
         );
         if let Some([low, high]) = self.bounds {
-            let point = |p: [f64; 3]| p.map(short).join(" ");
-            let _ = writeln!(
-                s,
-                "  bounds       {} to {}, diagonal {}, {}",
-                point(low),
-                point(high),
-                short(self.diagonal),
-                self.precision
-            );
+            let _ = writeln!(s, "  bounds       {}, {}", bounds_text(low, high), self.precision);
         }
         if !self.attributes.is_empty() {
             let names = self.attributes.iter().map(|a| format!("{} ({} x {})", a.name, a.width, a.encoding));
@@ -447,6 +486,12 @@ fn listed(counts: &[(usize, &str)]) -> String {
     let parts: Vec<String> =
         counts.iter().filter(|c| c.0 > 0).map(|c| format!("{} {}", thousands(c.0), c.1)).collect();
     if parts.is_empty() { String::new() } else { format!(": {}", parts.join(", ")) }
+}
+
+fn bounds_text(low: [f64; 3], high: [f64; 3]) -> String {
+    let point = |p: [f64; 3]| p.map(short).join(" ");
+    let diagonal = glam::DVec3::from_array(low).distance(glam::DVec3::from_array(high));
+    format!("{} to {}, diagonal {}", point(low), point(high), short(diagonal))
 }
 
 /// The first dozen, and how many more there are.

@@ -3,6 +3,7 @@
 //! Messages go to standard error and name the file; standard output is for what was asked for. Exit codes: 0 done, 1 done but the
 //! target was missed (or a check failed), 2 usage, 3 input unreadable or invalid, 4 output failed, 130 interrupted.
 
+mod args;
 mod common;
 mod completions;
 mod control;
@@ -10,6 +11,7 @@ mod convert;
 mod generate;
 mod info;
 mod man;
+mod picture;
 mod problems;
 mod simplify;
 

@@ -1,14 +1,15 @@
 //! `progmesh simplify IN OUT`.
 
-use super::common::{self, FormatName, PictureArgs, Shape, Warnings, short, thousands};
+use super::Failure;
+use super::args::{self, Input, Output, Shape};
+use super::common::{self, Warnings, short, thousands};
 use super::control::{Interrupt, Progress};
-use super::{Failure, common::name};
+use super::picture::PictureArgs;
 use clap::ValueEnum;
 use progmesh::io::files;
 use progmesh::pipeline::{Job, JobError, Summary, count, simplify_scene};
 use progmesh::simplify::{self as engine, MaxError, SimplifyError, Stop};
 use serde::Serialize;
-use std::path::PathBuf;
 use std::time::Instant;
 
 /// Reduce the number of faces of a mesh, or of a whole scene.
@@ -28,18 +29,10 @@ Examples:
 
 Exit code 1 means: done and written, but the target could not be met; the message says why.")]
 pub(crate) struct Args {
-    /// The mesh to read; - for standard input, with --from
-    #[arg(value_name = "IN")]
-    input: PathBuf,
-    /// The file to write; - for standard output, with --to
-    #[arg(value_name = "OUT")]
-    output: PathBuf,
-    /// Format of IN, instead of what its name says
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    from: Option<FormatName>,
-    /// Format of OUT, instead of what its name says
-    #[arg(long, value_enum, value_name = "FORMAT")]
-    to: Option<FormatName>,
+    #[command(flatten)]
+    input: Input,
+    #[command(flatten)]
+    output: Output,
 
     /// How to simplify
     #[arg(long, value_enum, default_value_t = MethodName::Quadric, help_heading = "Method")]
@@ -51,22 +44,27 @@ pub(crate) struct Args {
     #[arg(long, value_enum, help_heading = "Method")]
     schedule: Option<ScheduleName>,
     /// nsa: the most a face's normal may turn in one collapse, degrees [default: 12]
-    #[arg(long, value_name = "DEG", value_parser = common::degrees, allow_negative_numbers = true,
+    #[arg(long, value_name = "DEG", value_parser = args::degrees, allow_negative_numbers = true,
           help_heading = "Method")]
     epsilon: Option<f64>,
     /// nsa: at most this many passes
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Method")]
-    passes: Option<u32>,
+    #[arg(long, value_name = "K", value_parser = args::positive, allow_negative_numbers = true,
+          help_heading = "Method")]
+    passes: Option<usize>,
 
     /// Stop at this part of the input's triangles, 0 to 1
-    #[arg(long, value_name = "R", value_parser = common::fraction, conflicts_with = "triangles",
+    #[arg(long, value_name = "R", value_parser = args::fraction, conflicts_with = "triangles",
           allow_negative_numbers = true, help_heading = "Target")]
     ratio: Option<f64>,
     /// Stop at this many triangles (a polygon of n corners counts n - 2)
-    #[arg(long, value_name = "N", help_heading = "Target")]
+    #[arg(long, value_name = "N", value_parser = args::whole, allow_negative_numbers = true,
+          help_heading = "Target")]
     triangles: Option<usize>,
     /// Stop before the estimated error passes this, in world units (an estimate, not a bound)
-    #[arg(long, value_name = "E", value_parser = common::not_negative, allow_negative_numbers = true,
+    ///
+    /// With --method cluster it is the diagonal of a cell, so that no vertex moves farther than that: below the distance of
+    /// neighbouring vertices nothing is merged. 0 allows only what costs nothing.
+    #[arg(long, value_name = "E", value_parser = args::not_negative, allow_negative_numbers = true,
           help_heading = "Target")]
     max_error: Option<f64>,
     /// --max-error is a part of the bounding box's diagonal
@@ -95,7 +93,7 @@ pub(crate) struct Args {
     #[arg(long, help_heading = "What stays")]
     keep_vertices: bool,
     /// First remove components smaller than this part of the mesh's diagonal
-    #[arg(long, value_name = "FRACTION", value_parser = common::fraction, allow_negative_numbers = true,
+    #[arg(long, value_name = "FRACTION", value_parser = args::fraction, allow_negative_numbers = true,
           help_heading = "What stays")]
     prune: Option<f64>,
 
@@ -103,12 +101,9 @@ pub(crate) struct Args {
     shape: Shape,
     #[command(flatten)]
     picture: PictureArgs,
-    /// Write text where the format has text and binary (PLY, STL)
-    #[arg(long)]
-    text: bool,
     /// Threads to use; the result does not depend on it [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
+    #[arg(long, value_name = "N", value_parser = args::threads, allow_negative_numbers = true)]
+    threads: Option<usize>,
     /// Print one JSON object about the run on standard output (see docs/json.md)
     #[arg(long)]
     json: bool,
@@ -144,33 +139,41 @@ impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
         let job = self.job()?;
-        let format = common::output_format(&self.output, self.to)?;
-        let mut drawing = self.picture.drawing()?;
-        if self.json && files::is_dash(&self.output) {
+        if self.json && self.output.is_standard_output() {
             return Err(Failure::Usage(
                 "--json and OUT both want standard output; write OUT to a path".into(),
             ));
         }
-        let interrupt = Interrupt::watch();
         let mut warnings = Warnings::new(self.quiet);
-        let threads = self.threads.map(usize::from);
-        let file = name(&self.input, "standard input");
+        let format = self.output.format(&mut warnings)?;
+        let mut drawing = self.picture.drawing()?;
+        let interrupt = Interrupt::watch();
+        let file = self.input.name();
 
         // All within one pool, so that reading and writing keep to the number of threads too.
-        let (summary, seconds, written) = common::in_pool(threads, || {
-            let loaded = common::read(&self.input, self.from, &mut warnings)?;
+        let (summary, counts, seconds, written) = common::in_pool(self.threads, || {
+            let scene = self.input.read(&mut warnings)?.decoded.scene;
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
             if let Some(d) = &mut drawing {
-                d.add(&loaded.decoded.scene).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+                d.add(&scene).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
             }
-            let result = simplify_scene(loaded.decoded.scene, &job, &Progress::new(&interrupt, self.quiet));
+            let instanced_in = scene.instanced_triangles();
+            let result = simplify_scene(scene, &job, &Progress::new(&interrupt, self.quiet));
             let (scene, summary) = result.map_err(|e| failure(&file, e))?;
             warnings.say(summary.warnings.iter().map(|w| format!("{file}: {w}")));
+            warnings.say(self.nothing_merged(&summary).map(|w| format!("{file}: {w}")));
+            let counts = Triangles {
+                input: summary.triangles_in,
+                output: summary.triangles_out,
+                instanced_input: instanced_in,
+                instanced_output: scene.instanced_triangles(),
+                meshes: scene.meshes.len(),
+            };
             let writing = Instant::now();
             let written = match summary.stop {
                 Stop::Cancelled => Err(Failure::Interrupted),
-                _ => common::write(&self.output, format, self.text, &scene, &interrupt, &mut warnings),
+                _ => self.output.write(format, &scene, &interrupt, &mut warnings),
             };
             let write = writing.elapsed().as_secs_f64();
             let written = written.and_then(|()| match &mut drawing {
@@ -185,26 +188,31 @@ impl Args {
                 build: summary.build_seconds,
                 simplify: summary.simplify_seconds,
                 write,
+                draw: drawing.as_ref().map_or(0.0, |d| d.seconds),
                 total: start.elapsed().as_secs_f64(),
             };
-            Ok((summary, seconds, written))
+            Ok((summary, counts, seconds, written))
         })?;
         if let Err(e @ (Failure::Output(_) | Failure::BrokenPipe)) = written {
             return Err(e);
         }
         if !self.quiet && written.is_ok() {
-            self.tell(&file, &summary, &seconds);
+            self.tell(&file, &summary, &counts, &seconds);
         }
         if self.json {
-            common::print(&self.report(&summary, seconds, warnings.all)?)?;
+            common::print(&self.report(&summary, counts, seconds, warnings.all)?)?;
         }
         written?;
         match summary.target {
             Some(target) if summary.missed_target() => Err(Failure::Missed(format!(
-                "{file}: {} left, more than the {} asked for: no further collapse is legal. {}",
+                "{file}: {} left, more than the {} asked for: {}. {}",
                 count(summary.triangles_out, "triangle"),
                 thousands(target),
-                self.advice(&summary)
+                match self.method {
+                    MethodName::Cluster => "no grid leaves fewer, but none at all",
+                    _ => "no further collapse is legal",
+                },
+                self.advice(&summary, target)
             ))),
             _ => Ok(()),
         }
@@ -248,11 +256,11 @@ impl Args {
         o.ratio = self.ratio;
         o.max_error = self.max_error.map(|value| MaxError { value, relative: self.relative });
         o.epsilon = self.epsilon;
-        o.passes = self.passes.map(|k| k as usize);
+        o.passes = self.passes;
         o.lock_border = self.lock_border;
         o.keep_vertices = self.keep_vertices;
         o.prune = self.prune;
-        o.threads = self.threads.map(usize::from);
+        o.threads = self.threads;
         job.weld = self.shape.weld();
         job.normals = self.shape.normals()?;
         job.per_mesh = self.per_mesh;
@@ -264,7 +272,7 @@ impl Args {
     }
 
     /// The summary for people, on standard error.
-    fn tell(&self, file: &str, s: &Summary, t: &Seconds) {
+    fn tell(&self, file: &str, s: &Summary, n: &Triangles, t: &Seconds) {
         if self.method == MethodName::Nsa {
             for l in &s.levels {
                 common::note(&format!(
@@ -283,23 +291,26 @@ impl Args {
             false => String::new(),
         };
         common::note(&format!(
-            "{file}: {} -> {} faces ({percent:.1} %), {} vertices; {}, {:.3} s (read {:.3}, build {:.3}, simplify {:.3}, \
-             write {:.3}); estimated error {}{relative}; stopped: {}",
+            "{file}: {} -> {} faces ({percent:.1} %), {} vertices{}; {}, {:.3} s (read {:.3}, build {:.3}, simplify {:.3}, \
+             write {:.3}{}); estimated error {}{relative}; stopped: {}",
             thousands(s.faces_in),
             thousands(s.faces_out),
             thousands(s.vertices_out),
+            n.instances(),
             self.method_name(),
             t.total,
             t.read,
             t.build,
             t.simplify,
             t.write,
+            if t.draw > 0.0 { format!(", draw {:.3}", t.draw) } else { String::new() },
             short(s.estimate),
             match s.stop {
                 Stop::Target => "target reached",
                 Stop::Error => "error bound reached",
                 Stop::Passes => "passes done",
                 Stop::Cancelled => "interrupted",
+                _ if self.method == MethodName::Cluster => "a coarser grid would leave nothing",
                 _ => "no legal collapse left",
             }
         ));
@@ -314,7 +325,20 @@ impl Args {
     }
 
     /// What most likely stands in the way of the target, and what helps.
-    fn advice(&self, s: &Summary) -> String {
+    fn advice(&self, s: &Summary, target: usize) -> String {
+        if self.method == MethodName::Cluster {
+            return match self.locks() {
+                true => "Locked vertices are not merged: lock less, or try --method quadric".into(),
+                false => "Try --method quadric, which meets a target by single faces".into(),
+            };
+        }
+        if s.least_triangles > target {
+            return format!(
+                "A closed surface has at least 4 faces a component, with handles more, an open one 1: here {} together. Ask for \
+                 more, or try --weld or --prune, or --method cluster, which does not keep topology",
+                thousands(s.least_triangles)
+            );
+        }
         let last = s.levels.last().map(|l| l.refused).unwrap_or_default();
         let reasons = [
             (last.normal, "normals would turn too far: try a larger --epsilon"),
@@ -335,18 +359,39 @@ impl Args {
         }
     }
 
+    /// What to say where a bound on the cells of a grid kept all vertices apart.
+    fn nothing_merged(&self, s: &Summary) -> Option<String> {
+        let nothing = self.method == MethodName::Cluster
+            && self.max_error.is_some()
+            && s.stop == Stop::Error
+            && s.triangles_in > 0
+            && s.triangles_out == s.triangles_in;
+        nothing.then(|| {
+            "nothing was merged: for --method cluster --max-error is the diagonal of a cell, and no two vertices of a face lie in one; \
+             allow more, or try --method quadric"
+                .into()
+        })
+    }
+
     fn locks(&self) -> bool {
         let named = !self.lock_material.is_empty() || !self.lock_group.is_empty();
         named || self.lock_border || self.lock_property.is_some()
     }
 
-    fn report(&self, s: &Summary, seconds: Seconds, warnings: Vec<String>) -> Result<String, Failure> {
+    fn report(
+        &self,
+        s: &Summary,
+        triangles: Triangles,
+        seconds: Seconds,
+        warnings: Vec<String>,
+    ) -> Result<String, Failure> {
         let report = Report {
             command: "simplify",
             method: self.method_name(),
             faces_in: s.faces_in,
             faces_out: s.faces_out,
             vertices_out: s.vertices_out,
+            triangles,
             seconds,
             stop: match s.stop {
                 Stop::Target => "target",
@@ -402,6 +447,7 @@ struct Report {
     faces_in: usize,
     faces_out: usize,
     vertices_out: usize,
+    triangles: Triangles,
     seconds: Seconds,
     stop: &'static str,
     estimate: f64,
@@ -418,7 +464,34 @@ struct Seconds {
     build: f64,
     simplify: f64,
     write: f64,
+    draw: f64,
     total: f64,
+}
+
+/// Triangles of the unique meshes, which targets count, and of all instances, which are drawn.
+#[derive(Serialize)]
+struct Triangles {
+    input: usize,
+    output: usize,
+    instanced_input: usize,
+    instanced_output: usize,
+    #[serde(skip)]
+    meshes: usize,
+}
+
+impl Triangles {
+    /// For people, where instances make a difference.
+    fn instances(&self) -> String {
+        if (self.instanced_input, self.instanced_output) == (self.input, self.output) {
+            return String::new();
+        }
+        format!(
+            " in {}, each counted once (all instances: {} -> {} triangles)",
+            count(self.meshes, "mesh"),
+            thousands(self.instanced_input),
+            thousands(self.instanced_output)
+        )
+    }
 }
 
 #[derive(Serialize)]

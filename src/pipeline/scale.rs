@@ -17,9 +17,14 @@ pub fn world_scales(scene: &Scene) -> Vec<f64> {
     scales.into_iter().map(|s| if s > 0.0 && s.is_finite() { s } else { 1.0 }).collect()
 }
 
-/// Diagonal of the bounding box of all instances, world units; of the meshes as they are where no node shows any. The box of a turned
-/// instance is that of its own box's corners, so the diagonal may come out longer than of the vertices.
+/// Diagonal of [`world_bounds`].
 pub(super) fn world_diagonal(scene: &Scene) -> f64 {
+    world_bounds(scene).map_or(0.0, |(lo, hi)| lo.distance(hi))
+}
+
+/// Least and greatest coordinates of all instances, world units; of the meshes as they are where no node shows any. The box of a turned
+/// instance is that of its own box's corners, so it may come out larger than that of the vertices. O(vertices + nodes).
+pub fn world_bounds(scene: &Scene) -> Option<(DVec3, DVec3)> {
     let bounds: Vec<_> = scene.meshes.iter().map(|m| m.geometry.positions.bounds()).collect();
     let world = scene.world_transforms();
     let mut shown: Vec<(usize, DMat4)> =
@@ -34,7 +39,7 @@ pub(super) fn world_diagonal(scene: &Scene) -> f64 {
                 w.transform_point3(DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2)))
             })
         });
-    crate::aif::positions::bounds(corners).map_or(0.0, |(lo, hi)| lo.distance(hi))
+    crate::aif::positions::bounds(corners)
 }
 
 /// The largest singular value of the linear part: the most it stretches a length.

@@ -1,4 +1,4 @@
-//! Letters for captions: digits, the comma and what spells "triangles".
+//! Letters for captions: digits, the comma and what spells "triangles shown" and "instanced".
 
 /// Pixels of a letter across, without the gap to the next.
 pub(super) const WIDTH: u32 = 5;
@@ -20,14 +20,19 @@ pub(super) fn rows(letter: char) -> [u8; HEIGHT as usize] {
         '9' => [0b01110, 0b10001, 0b10001, 0b01111, 0b00001, 0b00010, 0b01100, 0, 0],
         ',' => [0, 0, 0, 0, 0, 0b00100, 0b00100, 0b01000, 0],
         'a' => [0, 0, 0b01110, 0b00001, 0b01111, 0b10001, 0b01111, 0, 0],
+        'c' => [0, 0, 0b01110, 0b10001, 0b10000, 0b10001, 0b01110, 0, 0],
+        'd' => [0b00001, 0b00001, 0b01111, 0b10001, 0b10001, 0b10001, 0b01111, 0, 0],
         'e' => [0, 0, 0b01110, 0b10001, 0b11111, 0b10000, 0b01110, 0, 0],
         'g' => [0, 0, 0b01111, 0b10001, 0b10001, 0b10001, 0b01111, 0b00001, 0b01110],
+        'h' => [0b10000, 0b10000, 0b11110, 0b10001, 0b10001, 0b10001, 0b10001, 0, 0],
         'i' => [0b00100, 0, 0b01100, 0b00100, 0b00100, 0b00100, 0b01110, 0, 0],
         'l' => [0b01100, 0b00100, 0b00100, 0b00100, 0b00100, 0b00100, 0b01110, 0, 0],
         'n' => [0, 0, 0b11110, 0b10001, 0b10001, 0b10001, 0b10001, 0, 0],
+        'o' => [0, 0, 0b01110, 0b10001, 0b10001, 0b10001, 0b01110, 0, 0],
         'r' => [0, 0, 0b10110, 0b11001, 0b10000, 0b10000, 0b10000, 0, 0],
         's' => [0, 0, 0b01111, 0b10000, 0b01110, 0b00001, 0b11110, 0, 0],
         't' => [0b01000, 0b01000, 0b11110, 0b01000, 0b01000, 0b01001, 0b00110, 0, 0],
+        'w' => [0, 0, 0b10001, 0b10001, 0b10101, 0b10101, 0b01010, 0, 0],
         _ => [0; HEIGHT as usize],
     }
 }
@@ -39,8 +44,8 @@ mod tests {
 
     #[test]
     fn letters_fit_and_differ() {
-        let all: HashSet<_> = "0123456789,aegilnrst".chars().map(rows).collect();
-        assert_eq!(all.len(), 20);
+        let all: HashSet<_> = "0123456789,acdeghilnorstw".chars().map(rows).collect();
+        assert_eq!(all.len(), 25);
         assert!(all.iter().flatten().all(|&row| row < 1 << WIDTH));
         assert_eq!(rows(' '), [0; HEIGHT as usize]);
     }

@@ -66,7 +66,15 @@ impl Picture {
         out
     }
 
-    /// Writes digits, commas and the letters of "triangles" at the lower left; other characters leave a gap.
+    /// The picture with this many rows of one colour below it: a place for a caption.
+    pub fn with_strip_below(mut self, rows: u32, color: [u8; 3]) -> Picture {
+        self.rgb.extend(color.repeat(self.width as usize * rows as usize));
+        self.height += rows;
+        self
+    }
+
+    /// Writes digits, commas and the letters of "triangles shown instanced" at the lower left, in the last 28 rows; other characters leave
+    /// a gap.
     pub fn caption(&mut self, text: &str, color: [u8; 3]) {
         let top = self.height.saturating_sub(MARGIN + font::HEIGHT * LETTER);
         for (k, letter) in text.chars().enumerate() {

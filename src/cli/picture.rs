@@ -1,0 +1,118 @@
+//! `--png`, `--wireframe`: pictures.
+
+use super::{Failure, common};
+use progmesh::io::files;
+use progmesh::report::{Picture, Style, Surface, SurfaceError, View, render};
+use progmesh::scene::Scene;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// `--png`, `--wireframe`: a picture.
+#[derive(clap::Args, Debug)]
+pub(crate) struct PictureArgs {
+    /// Draw a picture to this PNG file (with simplify: input and result side by side, from the same camera)
+    ///
+    /// Material base colours and the mesh's normals; no textures.
+    #[arg(long, value_name = "FILE.png", value_parser = png_name, help_heading = "Picture")]
+    png: Option<PathBuf>,
+    /// With --png: draw the edges of the faces too
+    #[arg(long, requires = "png", help_heading = "Picture")]
+    wireframe: bool,
+}
+
+/// Sides of each picture, pixels.
+const PICTURE: (u32, u32) = (480, 368);
+/// Rows below it for the caption, where no mesh is drawn.
+const CAPTION: u32 = 32;
+const WHITE: [u8; 3] = [255; 3];
+
+/// Pictures under way: all from the camera of the first.
+pub(crate) struct Drawing {
+    path: PathBuf,
+    style: Style,
+    view: Option<View>,
+    pictures: Vec<Picture>,
+    /// The time that drawing took so far.
+    pub(crate) seconds: f64,
+}
+
+/// A name that does not promise another kind of picture.
+fn png_name(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    if files::is_dash(&path) {
+        return Err("write the picture to a path, not to standard output".into());
+    }
+    match path.extension() {
+        Some(e) if !e.eq_ignore_ascii_case("png") => {
+            Err("pictures are PNG: the name must end in .png".into())
+        }
+        _ => Ok(path),
+    }
+}
+
+impl PictureArgs {
+    /// A drawing if one is asked for. Fails, before any work is done, where it could not be written.
+    pub(crate) fn drawing(&self) -> Result<Option<Drawing>, Failure> {
+        let Some(path) = self.png.clone() else { return Ok(None) };
+        common::check_target(&path)?;
+        let mut style = Style::default();
+        style.wireframe = self.wireframe;
+        Ok(Some(Drawing { path, style, view: None, pictures: vec![], seconds: 0.0 }))
+    }
+}
+
+impl Drawing {
+    /// Draws a scene, to the right of those before.
+    pub(crate) fn add(&mut self, scene: &Scene) -> Result<(), SurfaceError> {
+        let start = Instant::now();
+        let surface = Surface::of(scene)?;
+        let (width, height) = PICTURE;
+        let first = || View::three_quarter(surface.bounds(), width, height).tightened(&surface);
+        let view = self.view.get_or_insert_with(first);
+        let mut picture = render(&surface, view, &self.style).with_strip_below(CAPTION, WHITE);
+        picture.caption(&caption(surface.triangle_count(), scene.unique_triangles()), [64; 3]);
+        self.pictures.push(picture);
+        self.seconds += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Writes the file, all or nothing.
+    pub(crate) fn write(&mut self) -> Result<(), Failure> {
+        let start = Instant::now();
+        let failed = |why: String| Failure::Output(format!("{}: {why}", self.path.display()));
+        let bytes = Picture::beside(&self.pictures, WHITE).png();
+        let bytes = bytes.ok_or_else(|| failed("the picture could not be encoded".into()))?;
+        files::write_file(&self.path, &bytes).map_err(|e| failed(e.to_string()))?;
+        self.seconds += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+}
+
+/// What is shown may be more than the file holds, for instances count each; or less, for a mesh may be shown by no node.
+fn caption(shown: usize, unique: usize) -> String {
+    let what = if shown == 1 { "triangle" } else { "triangles" };
+    let how = match shown.cmp(&unique) {
+        std::cmp::Ordering::Less => " shown",
+        std::cmp::Ordering::Equal => "",
+        std::cmp::Ordering::Greater => " instanced",
+    };
+    format!("{} {what}{how}", common::thousands(shown))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_caption_says_what_it_counts() {
+        assert_eq!(caption(1, 1), "1 triangle");
+        assert_eq!(caption(121_496, 75_730), "121,496 triangles instanced");
+        assert_eq!(caption(2, 3), "2 triangles shown");
+    }
+
+    #[test]
+    fn names_of_other_kinds_are_refused() {
+        assert!(png_name("a.jpg").is_err() && png_name("-").is_err());
+        assert!(png_name("a.PNG").is_ok() && png_name("a").is_ok() && png_name("x.y/a").is_ok());
+    }
+}
