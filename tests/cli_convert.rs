@@ -174,6 +174,29 @@ fn nodes_and_groups_that_nobody_made_are_not_missed() {
 }
 
 #[test]
+fn what_gltf_holds_beside_meshes_is_said_to_be_lost() {
+    let p = Place::new();
+    p.generate("cad", "in.gltf", 300);
+    let mut d: serde_json::Value = serde_json::from_str(&p.text("in.gltf")).unwrap();
+    d["cameras"] =
+        json!([{"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 1}}]);
+    d["animations"] = json!([]);
+    d["materials"][0]["doubleSided"] = json!(true);
+    d["materials"][0]["alphaMode"] = json!("OPAQUE");
+    d["materials"][1]["extensions"] = json!({"KHR_materials_unlit": {}});
+    d["extensionsUsed"] = json!(["KHR_materials_unlit"]);
+    p.write("in.gltf", d.to_string());
+    for out in ["a.obj", "a.ply", "a.off", "a.stl"] {
+        let run = p.done(&format!("convert in.gltf {out}"));
+        assert!(run.stderr.contains("cannot hold cameras: left out\n"), "{out}: {}", run.stderr);
+    }
+    let run = p.done("convert in.gltf a.obj");
+    let text = "OBJ cannot hold these properties of materials: KHR_materials_unlit, doubleSided\n";
+    assert!(run.stderr.contains(text), "{}", run.stderr);
+    assert_eq!(p.done("convert in.gltf a.glb").stderr, "");
+}
+
+#[test]
 fn text_where_there_is_no_choice_is_said() {
     let p = Place::new();
     p.generate("sphere", "in.ply", 80);

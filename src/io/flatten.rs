@@ -68,6 +68,10 @@ fn place<'a>(scene: &'a Scene, format: &str) -> Flat<'a> {
     if scene.nodes.len() > 1 && instances.iter().any(|i| i.matrix != DMat4::IDENTITY) {
         warnings.push(format!("{format} has no nodes: their transforms are applied to the vertices"));
     }
+    let beside = scene.gltf.as_ref().map_or_else(Vec::new, |s| s.beside_surfaces());
+    if !beside.is_empty() {
+        warnings.push(format!("{format} cannot hold {}: left out", beside.join(", ")));
+    }
     if let [only] = &instances[..]
         && only.matrix == DMat4::IDENTITY
     {

@@ -18,6 +18,7 @@
 //! properties it does not know. It is the oracle of the tests.
 
 mod accessor;
+mod beside;
 mod columns;
 mod container;
 mod decode;

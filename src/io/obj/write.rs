@@ -19,6 +19,11 @@ pub fn encode(scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeE
     let stem = if options.stem.is_empty() { "mesh" } else { &options.stem };
     let names = material_names(scene);
     let mut writer = Writer::new(&flat.geometry, &mut encoded.warnings);
+    let lost = scene.gltf.as_ref().map(|s| s.other_material_properties()).filter(|l| !l.is_empty());
+    if let Some(lost) = lost {
+        let names: Vec<&str> = lost.into_iter().collect();
+        encoded.warnings.push(format!("OBJ cannot hold these properties of materials: {}", names.join(", ")));
+    }
     if !scene.materials.is_empty() {
         let library = format!("{}.mtl", line_name(stem));
         let _ = writeln!(writer.out, "mtllib {library}");
