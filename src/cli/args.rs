@@ -81,9 +81,14 @@ impl Output {
         common::name(&self.output, "standard output")
     }
 
-    /// True for `-`.
-    pub(crate) fn is_standard_output(&self) -> bool {
-        files::is_dash(&self.output)
+    /// Standard output is for one of the two.
+    pub(crate) fn leave_room_for(&self, json: bool) -> Result<(), Failure> {
+        if json && files::is_dash(&self.output) {
+            return Err(Failure::Usage(
+                "--json and OUT both want standard output; write OUT to a path".into(),
+            ));
+        }
+        Ok(())
     }
 
     /// The format to write. Fails, before any work is done, where nothing could be written.

@@ -6,6 +6,7 @@ use super::control::Interrupt;
 use progmesh::io::files::{self, Loaded, ReadError, WriteError};
 use progmesh::io::{EncodeOptions, Format, encode};
 use progmesh::scene::Scene;
+use serde::Serialize;
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
@@ -42,7 +43,8 @@ pub(crate) fn note(line: &str) {
 
 /// An error, in the form that clap gives its own.
 pub(crate) fn print_error(message: &str) {
-    note(&format!("error: {message}"));
+    // That nobody may be listening there is no failure.
+    let _ = clap::Error::raw(clap::error::ErrorKind::Io, format!("{message}\n")).print();
 }
 
 /// Prints to standard output.
@@ -52,6 +54,12 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
         std::io::ErrorKind::BrokenPipe => Failure::BrokenPipe,
         _ => Failure::Output(format!("standard output: {e}")),
     })
+}
+
+/// Prints one JSON object to standard output.
+pub(crate) fn print_json(object: &impl Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(object).map_err(|e| Failure::Output(e.to_string()))?;
+    print(&(text + "\n"))
 }
 
 /// A file's name for messages.

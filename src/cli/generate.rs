@@ -6,6 +6,7 @@ use super::common::{self, Warnings, thousands};
 use super::control::Interrupt;
 use progmesh::meshes::{self, GenerateOptions};
 use progmesh::samples;
+use serde::Serialize;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -41,6 +42,9 @@ pub(crate) struct Args {
     /// Write text where the format has text and binary (PLY, STL)
     #[arg(long)]
     text: bool,
+    /// Print one JSON object about the mesh on standard output (see docs/json.md)
+    #[arg(long)]
+    json: bool,
     /// Say nothing but errors
     #[arg(long, short)]
     quiet: bool,
@@ -53,11 +57,13 @@ impl Args {
         };
         let mut warnings = Warnings::new(self.quiet);
         let output = Output::new(output.clone(), self.to, self.text);
+        output.leave_room_for(self.json)?;
         let format = output.format(&mut warnings)?;
         let mut options = GenerateOptions::default().with_seed(self.seed);
         options.faces = self.faces;
         let sample = meshes::generate(name, &options).map_err(|e| Failure::Usage(e.to_string()))?;
-        let (vertices, faces) = (sample.positions.len(), sample.face_count());
+        let (vertices, faces, triangles) =
+            (sample.positions.len(), sample.face_count(), sample.triangle_count());
         let scene = samples::scene(sample, name);
         let interrupt = Interrupt::watch();
         interrupt.be_graceful();
@@ -75,8 +81,33 @@ impl Args {
                 thousands(faces)
             ));
         }
+        if self.json {
+            common::print_json(&Report {
+                command: "generate",
+                name,
+                seed: self.seed,
+                to: format.extension(),
+                vertices,
+                faces,
+                triangles,
+                warnings: warnings.all,
+            })?;
+        }
         Ok(())
     }
+}
+
+/// The schema of `--json`; docs/json.md says what each field means.
+#[derive(Serialize)]
+struct Report<'a> {
+    command: &'static str,
+    name: &'a str,
+    seed: u64,
+    to: &'static str,
+    vertices: usize,
+    faces: usize,
+    triangles: usize,
+    warnings: Vec<String>,
 }
 
 fn list() -> String {

@@ -98,8 +98,7 @@ impl Args {
             warnings: warnings.all,
         };
         if self.json {
-            let text = serde_json::to_string_pretty(&info).map_err(|e| Failure::Output(e.to_string()))?;
-            common::print(&(text + "\n"))?;
+            common::print_json(&info)?;
         } else {
             common::print(&info.text())?;
         }

@@ -139,11 +139,7 @@ impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
         let job = self.job()?;
-        if self.json && self.output.is_standard_output() {
-            return Err(Failure::Usage(
-                "--json and OUT both want standard output; write OUT to a path".into(),
-            ));
-        }
+        self.output.leave_room_for(self.json)?;
         let mut warnings = Warnings::new(self.quiet);
         let format = self.output.format(&mut warnings)?;
         let mut drawing = self.picture.drawing()?;
@@ -200,7 +196,7 @@ impl Args {
             self.tell(&file, &summary, &counts, &seconds);
         }
         if self.json {
-            common::print(&self.report(&summary, counts, seconds, warnings.all)?)?;
+            common::print_json(&self.report(&summary, counts, seconds, warnings.all))?;
         }
         written?;
         match summary.target {
@@ -378,14 +374,8 @@ impl Args {
         named || self.lock_border || self.lock_property.is_some()
     }
 
-    fn report(
-        &self,
-        s: &Summary,
-        triangles: Triangles,
-        seconds: Seconds,
-        warnings: Vec<String>,
-    ) -> Result<String, Failure> {
-        let report = Report {
+    fn report(&self, s: &Summary, triangles: Triangles, seconds: Seconds, warnings: Vec<String>) -> Report {
+        Report {
             command: "simplify",
             method: self.method_name(),
             faces_in: s.faces_in,
@@ -423,9 +413,7 @@ impl Args {
             aif_bytes: s.aif_bytes,
             peak_bytes: files::peak_bytes(),
             warnings,
-        };
-        let text = serde_json::to_string_pretty(&report).map_err(|e| Failure::Output(e.to_string()))?;
-        Ok(text + "\n")
+        }
     }
 }
 
