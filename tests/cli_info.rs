@@ -202,6 +202,35 @@ fn a_directory_is_called_one() {
 }
 
 #[test]
+fn a_file_of_another_format_than_its_name_says_is_recognised() {
+    let p = Place::new();
+    for from in ["ply", "off", "glb", "gltf"] {
+        p.generate("sphere", &format!("m.{from}"), 80);
+        for to in ["obj", "stl", "ply", "off"].iter().filter(|to| **to != from) {
+            std::fs::copy(p.path(&format!("m.{from}")), p.path(&format!("x.{to}"))).unwrap();
+            let run = p.run(&format!("info x.{to}"));
+            run.failed(3, &format!("it begins like {}: try --from {from}", from.to_uppercase()));
+            p.done(&format!("info x.{to} --from {from}"));
+        }
+    }
+    p.write("bad.ply", "ply\nformat ascii 1.0\n");
+    assert!(!p.run("info bad.ply").stderr.contains("begins like"));
+    assert!(p.done("generate empty e.off").code == 0);
+    assert!(p.done("info e.off").stdout.contains("form         no faces"));
+}
+
+#[test]
+fn names_in_a_file_do_not_command_the_terminal() {
+    let p = Place::new();
+    p.write("in.obj", "o a\u{1b}[2Jb\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    let run = p.done("info in.obj");
+    assert!(!run.stdout.contains('\u{1b}') && run.stdout.contains("[2Jb"), "{:?}", run.stdout);
+    p.write("bad.obj", "v 0 0 0\n\u{1b}[2J\n");
+    let run = p.run("info bad.obj");
+    assert!(run.code == 3 && !run.stderr.contains('\u{1b}'), "{:?}", run.stderr);
+}
+
+#[test]
 fn bad_input_is_exit_code_3() {
     let p = Place::new();
     p.write("bad.obj", "v 0 0 0\nv 1 0 0\nf 1 2 9\n");

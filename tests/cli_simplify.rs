@@ -103,6 +103,15 @@ fn wrong_usage_is_exit_code_2() {
 }
 
 #[test]
+fn a_distance_after_weld_needs_an_equals_sign_and_that_is_said() {
+    let p = Place::new();
+    p.generate("sphere", "in.obj", 80);
+    p.run("simplify in.obj out.obj --ratio 0.5 --weld 0.1").failed(2, "after an equals sign: --weld=0.1");
+    p.done("simplify --weld in.obj out.obj --ratio 0.5");
+    p.done("simplify in.obj out.obj --ratio 0.5 --weld=0.1");
+}
+
+#[test]
 fn an_unreadable_input_is_exit_code_3_and_an_unwritable_output_4() {
     let p = Place::new();
     p.generate("sphere", "in.obj", 80);

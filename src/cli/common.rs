@@ -7,6 +7,7 @@ use progmesh::io::files::{self, Loaded, ReadError, WriteError};
 use progmesh::io::{EncodeOptions, Format, encode};
 use progmesh::scene::Scene;
 use serde::Serialize;
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
@@ -38,13 +39,19 @@ impl Warnings {
 
 /// One line on standard error. That nobody may be listening there is no failure.
 pub(crate) fn note(line: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{line}");
+    let _ = writeln!(std::io::stderr().lock(), "{}", harmless(line));
+}
+
+/// Text in which names from a file may stand, without characters that a terminal would obey.
+pub(crate) fn harmless(text: &str) -> Cow<'_, str> {
+    let obeyed = |c: char| c.is_control() && c != '\n';
+    if text.contains(obeyed) { text.replace(obeyed, "\u{fffd}").into() } else { text.into() }
 }
 
 /// An error, in the form that clap gives its own.
 pub(crate) fn print_error(message: &str) {
     // That nobody may be listening there is no failure.
-    let _ = clap::Error::raw(clap::error::ErrorKind::Io, format!("{message}\n")).print();
+    let _ = clap::Error::raw(clap::error::ErrorKind::Io, format!("{}\n", harmless(message))).print();
 }
 
 /// Prints to standard output.
@@ -84,6 +91,9 @@ pub(crate) fn read(
             "{file}: say its format with --from obj|gltf|glb|ply|stl|off{}",
             or_by_name(path)
         )),
+        ReadError::Mistaken { like, .. } => {
+            Failure::Input(format!("{file}: {e}: try --from {}", like.extension()))
+        }
         e => Failure::Input(format!("{file}: {e}")),
     })?;
     warnings.say(std::mem::take(&mut loaded.decoded.warnings).into_iter().map(|w| format!("{file}: {w}")));
@@ -165,6 +175,12 @@ mod tests {
     fn numbers_are_grouped_and_short() {
         assert_eq!([0, 999, 1000, 1234567].map(thousands), ["0", "999", "1,000", "1,234,567"]);
         assert_eq!([0.0, 1.0, 0.12345, 1234.56, 1e-9].map(short), ["0", "1", "0.1235", "1235", "1.000e-9"]);
+    }
+
+    #[test]
+    fn what_a_terminal_would_obey_is_replaced() {
+        assert_eq!(harmless("a\u{1b}[2Jb\nc\r"), "a\u{fffd}[2Jb\nc\u{fffd}");
+        assert!(matches!(harmless("plain ü\n"), Cow::Borrowed(_)));
     }
 
     #[test]

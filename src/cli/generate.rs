@@ -76,9 +76,10 @@ impl Args {
             });
             let file = output.name();
             common::note(&format!(
-                "{file}: {} vertices, {} faces{far}",
+                "{file}: {} vertices, {} face{}{far}",
                 thousands(vertices),
-                thousands(faces)
+                thousands(faces),
+                if faces == 1 { "" } else { "s" }
             ));
         }
         if self.json {

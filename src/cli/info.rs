@@ -100,7 +100,7 @@ impl Args {
         if self.json {
             common::print_json(&info)?;
         } else {
-            common::print(&info.text())?;
+            common::print(&common::harmless(&info.text()))?;
         }
         match broken {
             Some(b) => Err(Failure::Missed(format!("{file}: {b}"))),
@@ -423,6 +423,7 @@ impl MeshInfo {
             let _ = writeln!(s, "  in the file  {} faces; {change}", n(self.file_faces));
         }
         let form = match (self.manifold, self.closed, self.orientable) {
+            _ if self.faces == 0 => "no faces",
             (true, true, true) => "closed surface",
             (true, true, false) => "closed surface, one-sided",
             (true, false, true) => "surface with border",

@@ -74,6 +74,17 @@ impl Failure {
     }
 }
 
+/// `--weld 0.1` reads like a value, but means `--weld` and a stray `0.1`.
+fn weld_tip(e: &clap::Error) {
+    use clap::error::{ContextKind, ContextValue, ErrorKind};
+    let Some(ContextValue::String(stray)) = e.get(ContextKind::InvalidArg) else { return };
+    let arguments: Vec<_> = std::env::args_os().collect();
+    let follows = arguments.windows(2).any(|w| w[0] == "--weld" && w[1] == stray.as_str());
+    if e.kind() == ErrorKind::UnknownArgument && follows {
+        common::note(&format!("\nA distance follows --weld after an equals sign: --weld={stray}"));
+    }
+}
+
 /// Runs the command that the process was started with.
 pub(crate) fn main() -> ExitCode {
     let command = match Cli::try_parse() {
@@ -81,6 +92,7 @@ pub(crate) fn main() -> ExitCode {
         Err(e) => {
             // Help and version too; a reader that has gone away is no fault.
             let _ = e.print();
+            weld_tip(&e);
             return ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2));
         }
     };

@@ -324,6 +324,7 @@ impl Args {
     fn advice(&self, s: &Summary, target: usize) -> String {
         if self.method == MethodName::Cluster {
             return match self.locks() {
+                _ if target == 0 => "A mesh is never left empty: ask for 1 or more".into(),
                 true => "Locked vertices are not merged: lock less, or try --method quadric".into(),
                 false => "Try --method quadric, which meets a target by single faces".into(),
             };

@@ -41,6 +41,14 @@ pub enum ReadError {
     /// The content is wrong.
     #[error(transparent)]
     Decode(#[from] DecodeError),
+    /// The content is wrong for the format it was taken for, and begins like another.
+    #[error("{error}; it begins like {}", like.extension().to_uppercase())]
+    Mistaken {
+        /// What is wrong with it.
+        error: DecodeError,
+        /// What it looks like.
+        like: Format,
+    },
 }
 
 /// Why a file could not be written. Nothing was changed, unless the variant says so.
@@ -86,11 +94,17 @@ pub fn read(path: &Path, format: Option<Format>) -> Result<Loaded, ReadError> {
     let format =
         format.or_else(|| Format::from_name(&path.to_string_lossy())).ok_or(ReadError::UnknownFormat)?;
     let bytes = read_bytes(path).map_err(ReadError::Io)?;
-    let decoded = if is_dash(path) {
-        decode(format, &bytes, &NoSide)?
-    } else {
-        decode(format, &bytes, &Beside::of(path))?
+    let decoded = match is_dash(path) {
+        true => decode(format, &bytes, &NoSide),
+        false => decode(format, &bytes, &Beside::of(path)),
     };
+    let decoded = decoded.map_err(|error| match Format::from_bytes(&bytes) {
+        // A GLB is told from a glTF when reading.
+        Some(like) if like != format && [like, format] != [Format::Glb, Format::Gltf] => {
+            ReadError::Mistaken { error, like }
+        }
+        _ => ReadError::Decode(error),
+    })?;
     Ok(Loaded { decoded, format, bytes: bytes.len() })
 }
 

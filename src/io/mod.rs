@@ -152,6 +152,18 @@ impl Format {
         })
     }
 
+    /// The format that a file's first bytes tell of beyond doubt: that of GLB, PLY, OFF, glTF. OBJ and STL have no mark.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        match text {
+            [b'g', b'l', b'T', b'F', ..] => Some(Format::Glb),
+            [b'p', b'l', b'y', b'\n' | b'\r', ..] => Some(Format::Ply),
+            [b'O', b'F', b'F', b'\n' | b'\r' | b' ', ..] => Some(Format::Off),
+            _ if text.trim_ascii_start().first() == Some(&b'{') => Some(Format::Gltf),
+            _ => None,
+        }
+    }
+
     /// The usual extension, without the dot.
     pub fn extension(self) -> &'static str {
         match self {
