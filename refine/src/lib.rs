@@ -22,8 +22,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod progressive;
 mod record;
 
 pub use progmesh_aif as aif;
 pub use progmesh_simplify as simplify;
+pub use progressive::{Cursor, ProgressiveMesh};
 pub use record::{History, HistoryLevel};

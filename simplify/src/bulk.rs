@@ -207,8 +207,8 @@ impl Lane {
             let Some(c) = m.evaluate(e) else { continue };
             let before = m.work.triangles;
             let done = match w.verdict.filter(|_| fresh) {
-                Some(verdict) => m.follow(e, &c, verdict),
-                None => m.attempt(e, &c),
+                Some(verdict) => m.follow(e, &c, verdict, progress.left),
+                None => m.attempt(e, &c, progress.left),
             };
             if !done {
                 self.blocked.set(e.index());

@@ -1,13 +1,14 @@
 //! Quadric edge collapse on one mesh (Garland & Heckbert 1997): quadrics, the cost and place of a candidate, and the collapse
 //! itself. The order is a schedule's business ([`crate::exact`], [`crate::bulk`]).
 
+use crate::log::CollapseLog;
 use crate::options::{Options, Placement, Refused};
 use crate::quadric::Quadric;
 use crate::validity::{HUB, MAX_VALENCE, RingFace, gather_ring};
 use crate::wedges::WedgeMerge;
 use crate::work::{Kind, Roles, Work};
 use glam::DVec3;
-use progmesh_aif::{EdgeId, Marks, VertexId};
+use progmesh_aif::{CollapseRecord, EdgeId, Marks, VertexId};
 
 /// Weight of the plane that stands on a border edge, times the edge's squared length. Decided on rangemap, bunny and dragon at 1 %:
 /// at 100 borders starve the surface (rangemap rms + 80 %), at 0.1 they drift.
@@ -52,6 +53,8 @@ pub(crate) struct Collapser<'m> {
     pub(crate) locked_edges: u64,
     wedges: WedgeMerge,
     scratch: Scratch,
+    /// Where collapses are written down, if they are.
+    pub(crate) log: Option<CollapseLog>,
 }
 
 /// What [`Collapser::check`] works with, one for each thread.
@@ -96,6 +99,7 @@ impl<'m> Collapser<'m> {
             locked_edges: 0,
             wedges,
             scratch: Scratch::default(),
+            log: None,
         }
     }
 
@@ -135,16 +139,22 @@ impl<'m> Collapser<'m> {
         }
     }
 
-    /// Collapses the candidate if topology and geometry allow it. O(valence).
-    pub(crate) fn attempt(&mut self, e: EdgeId, c: &Candidate) -> bool {
+    /// Collapses the candidate if topology and geometry allow it. `left` goes to the log. O(valence).
+    pub(crate) fn attempt(&mut self, e: EdgeId, c: &Candidate, left: usize) -> bool {
         let mut scratch = std::mem::take(&mut self.scratch);
         let verdict = self.check(e, c, &mut scratch);
         self.scratch = scratch;
-        self.follow(e, c, verdict)
+        self.follow(e, c, verdict, left)
     }
 
     /// Does what a fresh [`Collapser::check`] found, and counts it.
-    pub(crate) fn follow(&mut self, e: EdgeId, c: &Candidate, verdict: Result<DVec3, Refusal>) -> bool {
+    pub(crate) fn follow(
+        &mut self,
+        e: EdgeId,
+        c: &Candidate,
+        verdict: Result<DVec3, Refusal>,
+        left: usize,
+    ) -> bool {
         if let Err(Refusal::Error) = verdict {
             self.bounded = true;
             return false;
@@ -152,7 +162,7 @@ impl<'m> Collapser<'m> {
         self.tried += 1;
         let refusal = match verdict {
             Ok(to) => {
-                self.collapse(e, c, to);
+                self.collapse(e, c, to, left);
                 return true;
             }
             Err(refusal) => refusal,
@@ -224,16 +234,26 @@ impl<'m> Collapser<'m> {
         Ok(to)
     }
 
-    fn collapse(&mut self, e: EdgeId, c: &Candidate, to: DVec3) {
+    fn collapse(&mut self, e: EdgeId, c: &Candidate, to: DVec3, left: usize) {
         let k = c.roles.kept.index();
         let (q, step) = (self.joint_quadric(c.roles), to - self.work.points[k]);
+        let mut error = 0.0;
         if q.weight > 0.0 {
-            self.worst = self.worst.max(q.at(step) / q.weight);
+            error = q.at(step) / q.weight;
+            self.worst = self.worst.max(error);
+        }
+        if let Some(log) = &mut self.log {
+            log.note_wedges(self.work.mesh, e, c.roles.kept, c.roles.removed);
         }
         let q = q.moved(step);
         self.wedges.merge(&mut self.work, e, &c.roles, to);
         self.quadrics[k] = q;
-        self.work.perform(e, &c.roles, to);
+        let old = self.log.is_some().then(|| self.work.model_position(c.roles.kept));
+        let record = self.work.perform(e, &c.roles, to);
+        if let (Some(log), Some(old)) = (&mut self.log, old) {
+            let error = (error.max(0.0).sqrt() / self.work.scale) as f32;
+            log.push(self.work.mesh.topology(), &record, old, error, left);
+        }
     }
 
     /// The quadrics of both vertices, about the kept one.
@@ -360,7 +380,7 @@ fn fill_quadrics(work: &Work<'_>, options: &Options) -> Vec<Quadric> {
 
 impl Work<'_> {
     /// Collapses `e` in the topology and follows with the seams, the position and the count.
-    pub(crate) fn perform(&mut self, e: EdgeId, roles: &Roles, to: DVec3) {
+    pub(crate) fn perform(&mut self, e: EdgeId, roles: &Roles, to: DVec3) -> CollapseRecord {
         let record = self.mesh.topology_mut().collapse(e, roles.kept);
         for wing in record.wings() {
             self.triangles -= 1;
@@ -374,5 +394,6 @@ impl Work<'_> {
             self.moved.set(k);
         }
         debug_assert!(self.kinds[roles.removed.index()] != Kind::Pinned);
+        record
     }
 }

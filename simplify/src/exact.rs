@@ -143,7 +143,7 @@ pub(crate) fn run(meshes: &mut [Collapser<'_>], factors: &[f64], goal: &Goal, co
             continue;
         }
         let before = m.work.triangles;
-        if m.attempt(e, &c) {
+        if m.attempt(e, &c, progress.left) {
             progress.left -= before - m.work.triangles;
             for &x in m.work.mesh.topology().star(c.roles.kept) {
                 if waiting[i].get(x.index()) {

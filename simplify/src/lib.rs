@@ -14,6 +14,7 @@ mod collapser;
 mod exact;
 mod finish;
 mod locks;
+mod log;
 pub mod measure;
 pub mod nsa;
 mod options;
@@ -25,6 +26,7 @@ mod validity;
 mod wedges;
 mod work;
 
+pub use log::{CollapseLog, LoggedCollapse, LoggedWing, Recorded, record_all};
 pub use options::*;
 
 use progmesh_aif::Mesh;

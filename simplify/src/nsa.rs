@@ -16,6 +16,7 @@ mod pass;
 mod turn;
 
 use crate::finish::{Before, finish, target};
+use crate::log::{CollapseLog, Recorded};
 use crate::options::{Control, Level, Options, Outcome, SimplifyError, Stop};
 use pass::Engine;
 use progmesh_aif::{Collapse, Mesh};
@@ -100,6 +101,19 @@ pub(crate) fn simplify_all(
     Ok(each.map(|((m, b), (levels, estimate))| finish(m, b, options, (stop, estimate, levels))).collect())
 }
 
+/// [`crate::record_all`] by this method.
+pub(crate) fn record_all(
+    meshes: &mut [Mesh],
+    scales: &[f64],
+    options: &Options,
+    target: usize,
+    control: &dyn Control,
+) -> Result<(Stop, Vec<Recorded>), SimplifyError> {
+    let (stop, done, logs) = run_engines(meshes, scales, options, target, None, true, control)?;
+    let each = done.into_iter().zip(logs);
+    Ok((stop, each.map(|((levels, estimate), log)| Recorded { log, estimate, levels }).collect()))
+}
+
 /// The levels of a mesh, and its estimated error.
 pub(crate) type Done = (Vec<Level>, f64);
 
@@ -109,9 +123,21 @@ pub(crate) fn run_all(
     scales: &[f64],
     options: &Options,
     target: usize,
-    mut recorder: Option<&mut dyn Recorder>,
+    recorder: Option<&mut dyn Recorder>,
     control: &dyn Control,
 ) -> Result<(Stop, Vec<Done>), SimplifyError> {
+    run_engines(meshes, scales, options, target, recorder, false, control).map(|(stop, done, _)| (stop, done))
+}
+
+fn run_engines(
+    meshes: &mut [Mesh],
+    scales: &[f64],
+    options: &Options,
+    target: usize,
+    mut recorder: Option<&mut dyn Recorder>,
+    logged: bool,
+    control: &dyn Control,
+) -> Result<(Stop, Vec<Done>, Vec<CollapseLog>), SimplifyError> {
     let epsilon = options.epsilon.unwrap_or(DEFAULT_EPSILON);
     if !(0.0..=180.0).contains(&epsilon) {
         return Err(SimplifyError::Range { option: "epsilon", value: epsilon, range: "0 to 180 degrees" });
@@ -119,7 +145,9 @@ pub(crate) fn run_all(
     // Nothing may be changed before all options are known to be good.
     let mut engines = Vec::with_capacity(meshes.len());
     for (mesh, &scale) in meshes.iter_mut().zip(scales) {
-        engines.push(Engine::new(mesh, options, epsilon, scale)?);
+        let mut engine = Engine::new(mesh, options, epsilon, scale)?;
+        engine.log = logged.then(CollapseLog::default);
+        engines.push(engine);
     }
     for engine in &mut engines {
         engine.begin(&mut recorder);
@@ -148,7 +176,7 @@ pub(crate) fn run_all(
                 cancelled = cancelled || control.cancelled();
                 cancelled
             };
-            let counts = engine.pass(floor, &mut recorder, &mut poll);
+            let counts = engine.pass(floor, left - own, &mut recorder, &mut poll);
             left -= own - engine.triangles();
             if engine.triangles() < own {
                 let level = Level {
@@ -180,7 +208,8 @@ pub(crate) fn run_all(
         stop = Stop::Target;
     }
     let done = levels.into_iter().zip(&engines).map(|(l, e)| (l, e.estimate())).collect();
-    Ok((stop, done))
+    let logs = engines.into_iter().map(|e| e.log.unwrap_or_default()).collect();
+    Ok((stop, done, logs))
 }
 
 /// The part of the work that is done: towards the target, or the passes asked for, whichever is nearer.

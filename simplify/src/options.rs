@@ -203,6 +203,9 @@ pub enum SimplifyError {
         /// What it may be.
         range: &'static str,
     },
+    /// A recorded run was asked for something that is no sequence of edge collapses of triangles.
+    #[error("{0} cannot be recorded as edge collapses of triangles")]
+    NotRecorded(&'static str),
     /// Polygons make more triangles than ids can name. Split the mesh.
     #[error("cutting polygons into triangles: {0}")]
     TooLarge(#[from] progmesh_aif::BuildError),

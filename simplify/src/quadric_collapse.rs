@@ -2,7 +2,8 @@
 
 use crate::collapser::Collapser;
 use crate::finish::{Before, finish, target};
-use crate::options::{Control, Level, Options, Outcome, Schedule, SimplifyError};
+use crate::log::{CollapseLog, Recorded};
+use crate::options::{Control, Level, Options, Outcome, Schedule, SimplifyError, Stop};
 use crate::parallel::with_threads;
 use crate::work::Work;
 use crate::{bulk, exact};
@@ -20,9 +21,58 @@ pub(crate) fn simplify_all(
     let before: Vec<Before> = meshes.iter().map(Before::of).collect();
     let total = before.iter().map(|b| b.triangles).sum();
     let cut = meshes.iter_mut().map(triangulate).collect::<Result<Vec<_>, _>>()?;
+    let (stop, found) = run_all(meshes, scales, options, total, false, control)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let each = meshes.iter_mut().zip(&before).zip(found).zip(cut);
+    Ok(each
+        .map(|(((mesh, before), mut done), cut)| {
+            done.level.seconds = seconds;
+            let mut outcome = finish(mesh, before, options, (stop, done.estimate, vec![done.level]));
+            outcome.triangulated = cut;
+            outcome
+        })
+        .collect())
+}
+
+/// [`crate::record_all`] by this method.
+pub(crate) fn record_all(
+    meshes: &mut [Mesh],
+    scales: &[f64],
+    options: &Options,
+    control: &dyn Control,
+) -> Result<(Stop, Vec<Recorded>), SimplifyError> {
+    let start = Instant::now();
+    let total = meshes.iter().map(Mesh::triangle_count).sum();
+    let (stop, found) = run_all(meshes, scales, options, total, true, control)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let each = found.into_iter().map(|mut done| {
+        done.level.seconds = seconds;
+        Recorded { log: done.log, estimate: done.estimate, levels: vec![done.level] }
+    });
+    Ok((stop, each.collect()))
+}
+
+/// What came of one mesh.
+struct Done {
+    estimate: f64,
+    level: Level,
+    log: CollapseLog,
+}
+
+/// Collapses until `total` triangles have become the target. Meshes are triangular, and are not compacted.
+fn run_all(
+    meshes: &mut [Mesh],
+    scales: &[f64],
+    options: &Options,
+    total: usize,
+    logged: bool,
+    control: &dyn Control,
+) -> Result<(Stop, Vec<Done>), SimplifyError> {
     let mut collapsers = Vec::with_capacity(meshes.len());
     for (mesh, &scale) in meshes.iter_mut().zip(scales) {
-        collapsers.push(Collapser::new(Work::new(mesh, options)?, options, scale));
+        let mut collapser = Collapser::new(Work::new(mesh, options)?, options, scale);
+        collapser.log = logged.then(CollapseLog::default);
+        collapsers.push(collapser);
     }
     // Costs are areas times squared distances; common ones are in diagonals of the largest mesh, in world units.
     let largest = collapsers.iter().zip(scales).map(|(c, s)| c.work.diagonal * s).fold(0.0, f64::max);
@@ -37,25 +87,17 @@ pub(crate) fn simplify_all(
             with_threads(options.threads, || bulk::run(&mut collapsers, &factors, &goal, control))
         }
     };
-    let mut found = Vec::with_capacity(before.len());
+    let mut found = Vec::with_capacity(collapsers.len());
     for mut c in collapsers {
         c.work.write_back();
         let mut refused = c.refused;
         refused.locked += c.locked_edges;
         let tried = c.tried + c.locked_edges;
         let faces = c.work.mesh.face_count();
-        found.push((c.estimate(), Level { pass: 1, faces, seconds: 0.0, tried, refused }));
+        let level = Level { pass: 1, faces, seconds: 0.0, tried, refused };
+        found.push(Done { estimate: c.estimate(), level, log: c.log.unwrap_or_default() });
     }
-    let seconds = start.elapsed().as_secs_f64();
-    let each = meshes.iter_mut().zip(&before).zip(found).zip(cut);
-    Ok(each
-        .map(|(((mesh, before), (estimate, mut level)), cut)| {
-            level.seconds = seconds;
-            let mut outcome = finish(mesh, before, options, (stop, estimate, vec![level]));
-            outcome.triangulated = cut;
-            outcome
-        })
-        .collect())
+    Ok((stop, found))
 }
 
 /// Cuts polygons into triangles; says how many.

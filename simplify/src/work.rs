@@ -148,6 +148,15 @@ impl<'m> Work<'m> {
             })
     }
 
+    /// Where `v` is, model units, as [`Work::write_back`] will write it.
+    pub(crate) fn model_position(&self, v: VertexId) -> DVec3 {
+        if self.moved.get(v.index()) {
+            self.points[v.index()] / self.scale + self.centre
+        } else {
+            self.mesh.position(v)
+        }
+    }
+
     /// A local point in model units, rounded to the precision of the mesh.
     #[inline]
     pub(crate) fn to_model(&self, p: DVec3) -> DVec3 {

@@ -3,13 +3,14 @@
 use super::turn::{MaxTurn, newell};
 use super::{Recorder, Step};
 use crate::locks::locked_vertices;
+use crate::log::{CollapseLog, note_wedges};
 use crate::options::{Options, Placement, Refused, SimplifyError};
 use crate::quadric::Quadric;
 use crate::validity::{MAX_VALENCE, RingFace, gather_ring};
 use crate::wedges::WedgeMerge;
-use crate::work::{Roles, Work, wedge_at};
+use crate::work::{Roles, Work};
 use glam::DVec3;
-use progmesh_aif::{Bits, Collapse, EdgeId, FaceId, Marks, Mesh, NONE, VertexId};
+use progmesh_aif::{Bits, Collapse, EdgeId, FaceId, Marks, Mesh, VertexId};
 
 /// Optimal placement: pull towards the middle of the edge, relative to the mean eigenvalue of the quadric.
 const PULL: f64 = 1e-6;
@@ -33,6 +34,10 @@ pub(super) struct Engine<'m> {
     bound: f64,
     /// A collapse of the last pass was refused for the error bound.
     pub(super) bounded: bool,
+    /// Where collapses are written down, if they are.
+    pub(super) log: Option<CollapseLog>,
+    /// Triangles of the other meshes, for the log.
+    elsewhere: usize,
     scratch: Scratch,
 }
 
@@ -88,6 +93,8 @@ impl<'m> Engine<'m> {
             error: vec![0.0; slots],
             bound,
             bounded: false,
+            log: None,
+            elsewhere: 0,
             scratch: Scratch::default(),
             work,
         })
@@ -120,10 +127,12 @@ impl<'m> Engine<'m> {
     pub(super) fn pass(
         &mut self,
         floor: usize,
+        elsewhere: usize,
         recorder: &mut Option<&mut dyn Recorder>,
         poll: &mut dyn FnMut(usize) -> bool,
     ) -> (u64, Refused) {
         self.pass += 1;
+        self.elsewhere = elsewhere;
         self.bounded = false;
         let (mut tried, mut refused) = (0, Refused::default());
         for f in (0..self.work.mesh.topology().face_slots() as u32).map(FaceId) {
@@ -322,11 +331,15 @@ impl<'m> Engine<'m> {
         if recorder.is_some() {
             self.note_wedges(e, roles);
         }
+        if let Some(log) = &mut self.log {
+            log.note_wedges(self.work.mesh, e, roles.kept, roles.removed);
+        }
         if let Some(wedges) = &mut self.wedges {
             wedges.merge(&mut self.work, e, roles, to);
         }
         let (k, r) = (roles.kept.index(), roles.removed.index());
         let work = &mut self.work;
+        let left = self.elsewhere + work.triangles;
         let old_position = work.mesh.position(roles.kept);
         let record = work.mesh.collapse_unchecked(e, roles.kept);
         for wing in record.wings() {
@@ -342,6 +355,10 @@ impl<'m> Engine<'m> {
         }
         self.error[k] = error;
         (self.touched[k], self.touched[r]) = (self.pass, self.pass);
+        if let Some(log) = &mut self.log {
+            let error = (error as f64 / work.scale) as f32;
+            log.push(work.mesh.topology(), &record, old_position, error, left);
+        }
         if let Some(recorder) = recorder {
             let Scratch { corners, rows, values, .. } = &self.scratch;
             recorder.step(&Step { collapse: Collapse { record, old_position }, corners, rows, values });
@@ -355,19 +372,6 @@ impl<'m> Engine<'m> {
         rows.clear();
         values.clear();
         let Some(wedges) = self.work.mesh.wedges() else { return };
-        let t = self.work.mesh.topology();
-        for f in t.vertex_faces(roles.removed) {
-            let start = t.corner_range(f).start;
-            if let Some(i) = t.face_vertices(f).position(|v| v == roles.removed) {
-                corners.push(((start + i) as u32, wedges.corner[start + i]));
-            }
-        }
-        for &f in t.edge_faces(e) {
-            let w = wedge_at(self.work.mesh, wedges, f, roles.kept);
-            if w != NONE && !rows.iter().any(|r| r.0 == w) {
-                rows.push((w, wedges.present(w)));
-                values.extend_from_slice(wedges.row(w));
-            }
-        }
+        note_wedges(self.work.mesh, wedges, e, (roles.kept, roles.removed), corners, rows, values);
     }
 }

@@ -1,0 +1,252 @@
+//! Progressive meshes (Hoppe 1996): a base mesh and the vertex splits that refine it to the input.
+//!
+//! A [`ProgressiveMesh`] is static: flat arrays, one entry a split, shared by any number of [`Cursor`]s, each of which holds one mesh
+//! between `M^0` and `M^n`. What a split needs is stored outright, never as a difference, so that refining and coarsening are exact.
+//!
+//! Numbering: vertex slots `0..n0` are the base's, split `i` makes slot `n0 + i`. Faces `0..m0` are the base's, and every split appends one
+//! (at a border) or two. Corners name *wedges*, which are the slots of a vertex buffer: without attributes a wedge is its vertex.
+
+mod build;
+mod cursor;
+mod input;
+mod links;
+
+pub use build::{Built, BuiltAll, EncodeError, build, build_all};
+pub use cursor::{Cursor, Damage, Patch};
+pub use input::{InputOrder, Polygons, same_positions};
+
+use crate::aif::{Channel, NONE, Positions};
+
+/// What a split does beside its references, packed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SplitCode(pub u16);
+
+/// Which wedges a split makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SplitKind {
+    /// One: all corners of the new vertex are alike.
+    Plain,
+    /// Two: a seam runs through the new vertex, with one wedge on each side.
+    Seam,
+    /// As listed in [`WedgeStreams::explicit`].
+    Explicit,
+}
+
+impl SplitCode {
+    const TWO_FACES: u16 = 1 << 6;
+    const L_INNER: u16 = 1 << 7;
+    const L_STARTS: u16 = 1 << 8;
+    const R_INNER: u16 = 1 << 9;
+    const L_TIP_INNER: u16 = 1 << 10;
+    const R_TIP_INNER: u16 = 1 << 11;
+    const KIND: u16 = 12;
+    const MOVES: u16 = 1 << 14;
+    const ROWS: u16 = 1 << 15;
+
+    fn flag(self, bit: u16) -> bool {
+        self.0 & bit != 0
+    }
+
+    /// How the corners of `fl` lie: where its tip `vl` is (0..3), and whether `vu` (true) or `vt` follows it.
+    #[inline]
+    pub fn left(self) -> (usize, bool) {
+        arrangement(self.0)
+    }
+
+    /// The same of `fr` and `vr`.
+    #[inline]
+    pub fn right(self) -> (usize, bool) {
+        arrangement(self.0 >> 3)
+    }
+
+    /// The split makes two faces; one at a border.
+    #[inline]
+    pub fn two_faces(self) -> bool {
+        self.flag(Self::TWO_FACES)
+    }
+
+    /// The face of the left reference goes to the new vertex; else it stays with the old one.
+    #[inline]
+    pub fn left_inner(self) -> bool {
+        self.flag(Self::L_INNER)
+    }
+
+    /// The face of the left reference begins the referenced edge at the split vertex.
+    #[inline]
+    pub fn left_starts(self) -> bool {
+        self.flag(Self::L_STARTS)
+    }
+
+    /// The face of the right reference goes to the new vertex.
+    #[inline]
+    pub fn right_inner(self) -> bool {
+        self.flag(Self::R_INNER)
+    }
+
+    /// The tip of `fl` has the wedge of the neighbour at the new vertex; else of the one at the old.
+    #[inline]
+    pub fn left_tip_inner(self) -> bool {
+        self.flag(Self::L_TIP_INNER)
+    }
+
+    /// The same of `fr`.
+    #[inline]
+    pub fn right_tip_inner(self) -> bool {
+        self.flag(Self::R_TIP_INNER)
+    }
+
+    /// Which wedges it makes.
+    #[inline]
+    pub fn kind(self) -> SplitKind {
+        match (self.0 >> Self::KIND) & 3 {
+            0 => SplitKind::Plain,
+            1 => SplitKind::Seam,
+            _ => SplitKind::Explicit,
+        }
+    }
+
+    /// The split vertex moves.
+    #[inline]
+    pub fn moves(self) -> bool {
+        self.flag(Self::MOVES)
+    }
+
+    /// The split vertex's attributes change.
+    #[inline]
+    pub fn changes_rows(self) -> bool {
+        self.flag(Self::ROWS)
+    }
+}
+
+#[inline]
+fn arrangement(bits: u16) -> (usize, bool) {
+    const TABLE: [(usize, bool); 8] =
+        [(0, false), (1, false), (2, false), (0, true), (1, true), (2, true), (0, false), (0, false)];
+    TABLE[(bits & 7) as usize]
+}
+
+/// The vertex splits, coarsest first: parallel arrays.
+///
+/// `left[i]` and `right[i]` are the *cuts*: the edges of the split vertex that open, each as `face * 4 + edge` of the later-made of the two
+/// faces on it (so that `left`'s and `right`'s faces existing is what the split depends on). Edge `k` of a face runs from its
+/// corner `k` to corner `k + 1`. `right[i]` is [`NONE`] at a border.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Splits {
+    /// The vertex that is split.
+    pub vertex: Vec<u32>,
+    /// The left cut.
+    pub left: Vec<u32>,
+    /// The right cut, or [`NONE`].
+    pub right: Vec<u32>,
+    /// The rest.
+    pub code: Vec<SplitCode>,
+    /// The method's estimate of the error of the mesh before the split, here, in model units. Never larger than that of a split this one
+    /// depends on.
+    pub error: Vec<f32>,
+}
+
+impl Splits {
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.vertex.len()
+    }
+
+    /// True if there is none.
+    pub fn is_empty(&self) -> bool {
+        self.vertex.is_empty()
+    }
+}
+
+/// Attributes of the base and of the splits.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WedgeStreams {
+    /// What the values are.
+    pub channels: Vec<Channel>,
+    /// Numbers in a row: the widths of the channels together.
+    pub stride: usize,
+    /// The vertex of every wedge of the base.
+    pub base_vertex: Vec<u32>,
+    /// Rows: the base's wedges, then split by split those of its new wedges and those that its changed wedges get.
+    pub rows: Vec<f32>,
+    /// For every row the channels it has, bit k for channel k; a wedge that has none stands for "no attributes".
+    pub present: Vec<u64>,
+    /// For every explicit split: the number of pairs, of changed wedges; pairs (wedge before, wedge after) of the faces that go to the
+    /// new vertex, with new wedges numbered from the present count; the changed wedges; the wedges of `fl` at `vt`, `vu`, `vl`; the
+    /// same of `fr` if there is one.
+    pub explicit: Vec<u32>,
+}
+
+/// A base mesh, and the vertex splits that make the input of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ProgressiveMesh {
+    /// Corners of the base's faces, as wedges.
+    pub base_faces: Vec<[u32; 3]>,
+    /// Where the vertices of the base are.
+    pub base_positions: Positions,
+    /// The splits.
+    pub splits: Splits,
+    /// Where the new vertex of every split is; same precision as the base's.
+    pub new_positions: Positions,
+    /// Where the split vertex goes, for every split that moves it ([`SplitCode::moves`]), in order.
+    pub moved_positions: Positions,
+    /// Attributes, if the mesh has any.
+    pub wedges: Option<WedgeStreams>,
+    /// Material of every face; empty for none, [`NONE`] for a face without.
+    pub face_material: Vec<u32>,
+    /// Group of every face; empty for none, [`NONE`] for a face without.
+    pub face_group: Vec<u32>,
+    /// Edges without a face, by vertices of the base.
+    pub wires: Vec<[u32; 2]>,
+    /// How the input numbered its elements; without it full detail comes in the order of the splits.
+    pub order: Option<InputOrder>,
+    /// Split counts at which levels stand, coarse to fine, full detail included (NSA: its passes).
+    pub levels: Vec<u32>,
+}
+
+impl ProgressiveMesh {
+    /// Vertices of the base.
+    pub fn base_vertices(&self) -> usize {
+        self.base_positions.len()
+    }
+
+    /// Vertices at full detail.
+    pub fn vertices(&self) -> usize {
+        self.base_vertices() + self.splits.len()
+    }
+
+    /// Faces at full detail. O(n).
+    pub fn faces(&self) -> usize {
+        let two = self.splits.code.iter().filter(|c| c.two_faces()).count();
+        self.base_faces.len() + self.splits.len() + two
+    }
+
+    /// A cursor at the base.
+    ///
+    /// Errors: arrays that do not fit together.
+    pub fn cursor(&self) -> Result<Cursor<&ProgressiveMesh>, Damage> {
+        Cursor::new(self)
+    }
+
+    /// Bytes of the static structure: splits, positions, attributes, materials; without [`ProgressiveMesh::order`].
+    pub fn bytes(&self) -> usize {
+        let positions = |p: &Positions| p.len() * if p.is_f64() { 24 } else { 12 };
+        let wedges = self
+            .wedges
+            .as_ref()
+            .map_or(0, |w| 4 * (w.base_vertex.len() + w.rows.len() + w.explicit.len()) + 8 * w.present.len());
+        12 * self.base_faces.len()
+            + positions(&self.base_positions)
+            + positions(&self.new_positions)
+            + positions(&self.moved_positions)
+            + self.splits.len() * (3 * 4 + 2 + 4)
+            + wedges
+            + 4 * (self.face_material.len() + self.face_group.len())
+            + 8 * self.wires.len()
+    }
+
+    /// The right cut of split `i`, if it has one.
+    #[inline]
+    pub fn right(&self, i: usize) -> Option<u32> {
+        Some(self.splits.right[i]).filter(|&r| r != NONE)
+    }
+}

@@ -1,0 +1,239 @@
+//! How the input numbered its elements, so that full detail is the input bit for bit.
+
+use super::{Cursor, ProgressiveMesh};
+use crate::aif::{MeshInput, NONE, Positions, Wedges};
+use rustc_hash::FxHashMap;
+use std::ops::Deref;
+
+/// The input's numbering, and what triangles do not tell of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct InputOrder {
+    /// Vertex slot -> vertex of the input.
+    pub vertex: Vec<u32>,
+    /// Face slot -> face of the input, after cutting polygons into triangles.
+    pub face: Vec<u32>,
+    /// The polygons, if the input had any with more than three corners.
+    pub polygons: Option<Polygons>,
+    /// Wedge slot at full detail -> wedge of the input ([`NONE`]: no attributes).
+    pub wedge: Vec<u32>,
+    /// Corners of the input whose wedge is not what `wedge` says, and what it is.
+    pub corner_wedges: Vec<(u32, u32)>,
+    /// Wedges of the input that differ in bits from what the splits bring (the sign of a zero).
+    pub rows: Vec<(u32, u64)>,
+    /// The values of `rows`, row after row.
+    pub values: Vec<f32>,
+}
+
+/// Polygons made of triangles.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Polygons {
+    /// Corners of every polygon.
+    pub sizes: Vec<u32>,
+    /// Every polygon corner as a corner of the triangles (`3 * face + corner`).
+    pub corners: Vec<u32>,
+}
+
+impl InputOrder {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let polygons = self.polygons.as_ref().map_or(0, |p| p.sizes.len() + p.corners.len());
+        4 * (self.vertex.len() + self.face.len() + self.wedge.len() + self.values.len() + polygons)
+            + 8 * self.corner_wedges.len()
+            + 16 * self.rows.len()
+    }
+
+    /// Finds every polygon corner among the corners of the polygon's triangles.
+    pub(super) fn note_polygons(&mut self, input: &MeshInput, triangles: &MeshInput, face_map: &[u32]) {
+        let Some(sizes) = &input.face_sizes else { return };
+        let wedge = |m: &MeshInput, c: usize| m.wedges.as_ref().map_or(NONE, |w| w.corner[c]);
+        let (mut corners, mut at, mut t) = (Vec::with_capacity(input.corners.len()), 0, 0);
+        for (f, &size) in sizes.iter().enumerate() {
+            let first = t;
+            while t < face_map.len() && face_map[t] as usize == f {
+                t += 1;
+            }
+            let mut from = 3 * first;
+            for c in at..at + size as usize {
+                let range = 3 * first..3 * t;
+                let same = |&k: &usize| {
+                    triangles.corners[k] == input.corners[c]
+                        && same_wedge(triangles, wedge(triangles, k), input, wedge(input, c))
+                };
+                // Mostly the next corner is near the last.
+                let found = (from..range.end).find(same).or_else(|| range.clone().find(same));
+                let found = found.unwrap_or(range.start);
+                corners.push(found as u32);
+                from = found;
+            }
+            at += size as usize;
+        }
+        self.polygons = Some(Polygons { sizes: sizes.clone(), corners });
+    }
+
+    /// Where the triangles' corners that make the input's corners are in the index buffer at full detail, one after the other.
+    fn corner_slots(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let mut slot = vec![0u32; self.face.len()];
+        self.face.iter().enumerate().for_each(|(s, &f)| slot[f as usize] = s as u32);
+        let n = self.polygons.as_ref().map_or(3 * slot.len(), |p| p.corners.len());
+        (0..n).map(move |c| {
+            let c = self.polygons.as_ref().map_or(c, |p| p.corners[c] as usize);
+            (slot[c / 3] as usize, c % 3)
+        })
+    }
+
+    /// Compares the wedges of `full`, which stands at full detail, with the input's.
+    pub(super) fn note_wedges(&mut self, full: &Cursor<&ProgressiveMesh>, input: &Wedges) {
+        let mut of_slot: Vec<Option<u32>> = vec![None; full.wedge_count()];
+        let mut source = vec![NONE; input.len()];
+        let slots: Vec<u32> = self.corner_slots().map(|(f, k)| full.indices()[f][k]).collect();
+        for (c, (&w, s)) in input.corner.iter().zip(slots).enumerate() {
+            let of = *of_slot[s as usize].get_or_insert(w);
+            if of != w {
+                self.corner_wedges.push((c as u32, w));
+            }
+            if w != NONE {
+                source[w as usize] = s;
+            }
+        }
+        self.wedge = of_slot.into_iter().map(|w| w.unwrap_or(NONE)).collect();
+        for (w, &s) in source.iter().enumerate() {
+            let row = input.row(w as u32);
+            let same = s != NONE
+                && full.present(s) == input.present(w as u32)
+                && full.row(s).iter().zip(row).all(|(a, b)| a.to_bits() == b.to_bits());
+            if !same {
+                self.rows.push((w as u32, input.present(w as u32)));
+                self.values.extend_from_slice(row);
+            }
+        }
+    }
+}
+
+fn same_wedge(a: &MeshInput, x: u32, b: &MeshInput, y: u32) -> bool {
+    match (&a.wedges, &b.wedges) {
+        (Some(a), Some(b)) if x != NONE && y != NONE => {
+            a.present(x) == b.present(y)
+                && a.row(x).iter().zip(b.row(y)).all(|(p, q)| p.to_bits() == q.to_bits())
+        }
+        _ => (x == NONE) == (y == NONE),
+    }
+}
+
+impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
+    /// The mesh as flat arrays in the input's numbering, as far as its elements are there: vertices and faces keep the input's order among
+    /// themselves. At full detail this is the input bit for bit, polygons included; elsewhere, triangles. Without
+    /// [`ProgressiveMesh::order`], as [`Cursor::to_input`]. O(n log n).
+    pub fn to_ordered_input(&self) -> MeshInput {
+        let pm = self.source();
+        let plain = self.to_input();
+        let Some(order) = &pm.order else { return plain };
+        let full = self.position() == pm.splits.len();
+        // Slots in the order of the input.
+        let sorted = |of: &[u32], n: usize| {
+            let mut slots: Vec<u32> = (0..n as u32).collect();
+            slots.sort_unstable_by_key(|&s| of.get(s as usize).copied().unwrap_or(NONE));
+            slots
+        };
+        let vertices = sorted(&order.vertex, self.vertex_count());
+        let faces = sorted(&order.face, self.face_count());
+        let mut vertex = vec![0; vertices.len()];
+        vertices.iter().enumerate().for_each(|(new, &s)| vertex[s as usize] = new as u32);
+        let per_face = |values: &[u32]| -> Vec<u32> {
+            if values.is_empty() { Vec::new() } else { faces.iter().map(|&f| values[f as usize]).collect() }
+        };
+        let corner_slots = || faces.iter().flat_map(|&f| (0..3).map(move |k| 3 * f as usize + k));
+        let mut out = MeshInput {
+            positions: plain.positions.gather(&vertices),
+            corners: corner_slots().map(|c| vertex[plain.corners[c] as usize]).collect(),
+            wires: plain.wires.iter().map(|w| w.map(|v| vertex[v as usize])).collect(),
+            face_material: per_face(&plain.face_material),
+            face_group: per_face(&plain.face_group),
+            ..Default::default()
+        };
+        if let Some(w) = &plain.wedges {
+            out.wedges = if full {
+                self.input_wedges(order, w)
+            } else {
+                number_by_first_use(w, corner_slots().map(|c| w.corner[c]).collect())
+            };
+        }
+        if let Some(p) = order.polygons.as_ref().filter(|_| full) {
+            restore_polygons(&mut out, p);
+        }
+        out
+    }
+
+    /// The wedges of the input; `have` holds those of full detail, by slot.
+    fn input_wedges(&self, order: &InputOrder, have: &Wedges) -> Option<Wedges> {
+        let slots: Vec<u32> = order.corner_slots().map(|(f, k)| self.indices()[f][k]).collect();
+        let mut corner: Vec<u32> = slots.iter().map(|&s| order.wedge[s as usize]).collect();
+        for &(c, w) in &order.corner_wedges {
+            corner[c as usize] = w;
+        }
+        let count = corner.iter().filter(|w| **w != NONE).max().map_or(0, |&w| w as usize + 1);
+        let mut source = vec![NONE; count];
+        for (&s, &w) in slots.iter().zip(&corner) {
+            if w != NONE {
+                source[w as usize] = s;
+            }
+        }
+        let patches: FxHashMap<u32, usize> = order.rows.iter().enumerate().map(|(k, r)| (r.0, k)).collect();
+        let mut out = Wedges::new(have.channels().to_vec()).ok()?;
+        let stride = out.stride();
+        for (w, &s) in source.iter().enumerate() {
+            match patches.get(&(w as u32)) {
+                Some(&k) => out.push(&order.values[k * stride..(k + 1) * stride], order.rows[k].1),
+                None => out.push(have.row(s), have.present(s)),
+            };
+        }
+        out.corner = corner;
+        Some(out)
+    }
+}
+
+/// Wedges that corners have, numbered by first use.
+fn number_by_first_use(w: &Wedges, mut corner: Vec<u32>) -> Option<Wedges> {
+    let mut out = Wedges::new(w.channels().to_vec()).ok()?;
+    let mut new = vec![NONE; w.len()];
+    for c in corner.iter_mut().filter(|c| **c != NONE) {
+        let n = &mut new[*c as usize];
+        if *n == NONE {
+            *n = out.push(w.row(*c), w.present(*c));
+        }
+        *c = *n;
+    }
+    out.corner = corner;
+    Some(out)
+}
+
+/// Triangles become the polygons they were cut from.
+fn restore_polygons(out: &mut MeshInput, p: &Polygons) {
+    let mut first = Vec::with_capacity(p.sizes.len());
+    let mut at = 0;
+    for &size in &p.sizes {
+        first.push(p.corners.get(at).map_or(0, |&c| c as usize / 3));
+        at += size as usize;
+    }
+    let per_face = |values: &[u32]| -> Vec<u32> {
+        if values.is_empty() { Vec::new() } else { first.iter().map(|&f| values[f]).collect() }
+    };
+    out.face_material = per_face(&out.face_material);
+    out.face_group = per_face(&out.face_group);
+    out.corners = p.corners.iter().map(|&c| out.corners[c as usize]).collect();
+    out.face_sizes = Some(p.sizes.clone());
+}
+
+/// True if both hold the same bits.
+pub fn same_positions(a: &Positions, b: &Positions) -> bool {
+    match (a, b) {
+        (Positions::F32(a), Positions::F32(b)) => {
+            a.len() == b.len()
+                && a.as_flattened().iter().zip(b.as_flattened()).all(|(x, y)| x.to_bits() == y.to_bits())
+        }
+        (Positions::F64(a), Positions::F64(b)) => {
+            a.len() == b.len()
+                && a.as_flattened().iter().zip(b.as_flattened()).all(|(x, y)| x.to_bits() == y.to_bits())
+        }
+        _ => false,
+    }
+}

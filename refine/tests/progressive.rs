@@ -1,0 +1,283 @@
+//! Progressive meshes: exact in both directions, from every method and on every sample mesh.
+
+use progmesh_meshes::{GenerateOptions, Sample, generate};
+use progmesh_refine::aif::*;
+use progmesh_refine::progressive::{Patch, build, build_all, same_positions};
+use progmesh_refine::simplify::{Method, Options, Placement, Quiet, Schedule, simplify};
+use progmesh_refine::{Cursor, ProgressiveMesh};
+use proptest::prelude::*;
+
+/// The sample with normals and uvs as wedges, one for each pair of values: shared across seams, so that NSA must part them.
+fn mesh_of(s: &Sample) -> Mesh {
+    let mut input = MeshInput {
+        positions: Positions::from_f64(s.positions.clone()),
+        face_sizes: s.face_sizes.clone(),
+        corners: s.corners.clone(),
+        wires: s.wires.clone(),
+        face_material: s.face_material.clone(),
+        ..Default::default()
+    };
+    if let Some(n) = &s.normals {
+        let mut channels = vec![Channel::new(Semantic::Normal, 3)];
+        s.uvs.iter().for_each(|_| channels.push(Channel::new(Semantic::TexCoord(0), 2)));
+        let all = (1 << channels.len()) - 1;
+        let mut w = Wedges::new(channels).unwrap();
+        let mut known = std::collections::HashMap::new();
+        for c in 0..s.corners.len() {
+            let uv = s.uvs.as_ref().map(|u| u.corner[c]);
+            let id = *known.entry((n.corner[c], uv)).or_insert_with(|| {
+                let mut row = n.values[n.corner[c] as usize].to_vec();
+                s.uvs.iter().for_each(|u| row.extend(u.values[u.corner[c] as usize]));
+                w.push(&row, all)
+            });
+            w.corner.push(id);
+        }
+        input.wedges = Some(w);
+    }
+    Mesh::build(input, &BuildOptions::default()).unwrap().0
+}
+
+fn sample(name: &str, faces: usize, seed: u64) -> Mesh {
+    mesh_of(&generate(name, &GenerateOptions::default().with_faces(faces).with_seed(seed)).unwrap())
+}
+
+const NAMES: [&str; 8] =
+    ["sphere", "torus", "scan", "terrain", "polygons", "quad-sphere", "cad", "nonmanifold"];
+
+fn options(method: Method, placement: Option<Placement>) -> Options {
+    let mut o = Options::default();
+    (o.method, o.placement) = (method, placement);
+    o
+}
+
+/// Every array, bit for bit.
+fn assert_same(a: &MeshInput, b: &MeshInput) {
+    assert!(same_positions(&a.positions, &b.positions), "positions");
+    assert_eq!(a.face_sizes, b.face_sizes);
+    assert_eq!(a.corners, b.corners);
+    assert_eq!(a.wires, b.wires);
+    assert_eq!(a.face_material, b.face_material);
+    assert_eq!(a.face_group, b.face_group);
+    assert_eq!(a.wedges.is_some(), b.wedges.is_some());
+    let bits = |w: &Wedges| -> Vec<(u64, Vec<u32>)> {
+        (0..w.len() as u32).map(|i| (w.present(i), w.row(i).iter().map(|x| x.to_bits()).collect())).collect()
+    };
+    if let (Some(x), Some(y)) = (&a.wedges, &b.wedges) {
+        assert_eq!(x.channels(), y.channels());
+        assert_eq!(x.corner, y.corner);
+        assert_eq!(bits(x), bits(y));
+    }
+}
+
+/// What a vertex buffer and an index buffer hold, as bits.
+fn buffers(c: &Cursor<&ProgressiveMesh>) -> (Vec<[u32; 3]>, Vec<([u64; 3], u64, Vec<u32>)>) {
+    let wedge = |w: u32| {
+        let row = c.row(w).iter().map(|x| x.to_bits()).collect();
+        (c.positions().get(c.wedge_vertex(w) as usize).to_array().map(f64::to_bits), c.present(w), row)
+    };
+    (c.indices().to_vec(), (0..c.wedge_count() as u32).map(wedge).collect())
+}
+
+/// The mesh at the cursor holds every invariant.
+fn assert_valid(c: &Cursor<&ProgressiveMesh>) -> Mesh {
+    let (mesh, report) = Mesh::build(c.to_input(), &BuildOptions::default()).unwrap();
+    mesh.check().unwrap();
+    assert!(report.dropped_faces.is_empty() && report.split_faces.is_empty());
+    mesh
+}
+
+fn runs() -> Vec<Options> {
+    let mut all = vec![
+        options(Method::Quadric, None),
+        options(Method::Quadric, Some(Placement::Endpoint)),
+        options(Method::Quadric, Some(Placement::Midpoint)),
+        options(Method::Nsa, None),
+        options(Method::Nsa, Some(Placement::Endpoint)),
+        options(Method::Nsa, Some(Placement::Optimal)),
+    ];
+    all[1].schedule = Some(Schedule::Exact);
+    all[4].epsilon = Some(60.0);
+    all
+}
+
+#[test]
+fn full_detail_is_the_input_bit_for_bit_by_every_method() {
+    for name in NAMES {
+        let mesh = sample(name, 3000, 7);
+        let input = mesh.to_input();
+        for o in runs() {
+            let pm = build(mesh.clone(), &o, &Quiet).unwrap().mesh;
+            assert!(pm.splits.len() > 100, "{name}: {} splits", pm.splits.len());
+            let mut c = pm.cursor().unwrap();
+            let base = buffers(&c);
+            assert_valid(&c);
+            for _ in 0..2 {
+                c.seek(usize::MAX).unwrap();
+                assert_eq!(c.face_count(), pm.faces());
+                assert_same(&c.to_ordered_input(), &input);
+                c.seek(0).unwrap();
+                assert_eq!(buffers(&c), base, "{name} {o:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_state_on_the_way_is_valid_and_has_the_topology_of_the_input() {
+    for name in NAMES {
+        let mesh = sample(name, 1200, 3);
+        let topology = |m: &Mesh| {
+            let t = m.topology();
+            (t.euler_characteristic(), t.border_loops().len(), t.face_components().count)
+        };
+        let full = topology(&mesh);
+        let pm = build(mesh, &options(Method::Quadric, None), &Quiet).unwrap().mesh;
+        let mut c = pm.cursor().unwrap();
+        for k in (0..=pm.splits.len()).step_by(37) {
+            c.seek(k).unwrap();
+            assert_eq!(topology(&assert_valid(&c)), full, "{name} at {k}");
+        }
+    }
+}
+
+#[test]
+fn a_state_of_the_exact_schedule_is_what_simplify_returns_for_that_count() {
+    for name in ["scan", "cad", "quad-sphere", "torus"] {
+        let mesh = sample(name, 2000, 1);
+        for placement in [Placement::Optimal, Placement::Endpoint] {
+            let mut o = options(Method::Quadric, Some(placement));
+            o.schedule = Some(Schedule::Exact);
+            let pm = build(mesh.clone(), &o, &Quiet).unwrap().mesh;
+            let mut c = pm.cursor().unwrap();
+            for faces in [1500, 700, 201] {
+                let mut simplified = mesh.clone();
+                o.triangles = Some(faces);
+                simplify(&mut simplified, &o, &Quiet).unwrap();
+                c.seek_faces(simplified.face_count()).unwrap();
+                let mut have = c.to_ordered_input();
+                let want = simplified.to_input();
+                // Simplification leaves out vertices without a face.
+                let (clean, _) = Mesh::build(have, &BuildOptions::default()).unwrap();
+                have = clean.compact(CompactOptions::with_drop_isolated(true)).0.to_input();
+                assert_same(&have, &want);
+            }
+        }
+    }
+}
+
+#[test]
+fn nsa_levels_are_its_passes() {
+    let mesh = sample("scan", 4000, 2);
+    let mut o = options(Method::Nsa, None);
+    o.passes = Some(4);
+    let mut simplified = mesh.clone();
+    let outcome = simplify(&mut simplified, &o, &Quiet).unwrap();
+    let pm = build(mesh.clone(), &o, &Quiet).unwrap().mesh;
+    let mut counts: Vec<usize> = outcome.levels.iter().rev().map(|l| l.faces).collect();
+    counts.push(mesh.face_count());
+    let mut c = pm.cursor().unwrap();
+    let levels: Vec<usize> = (0..pm.levels.len())
+        .map(|k| {
+            c.seek_level(k).unwrap();
+            c.face_count()
+        })
+        .collect();
+    assert_eq!(levels, counts);
+}
+
+#[test]
+fn patches_turn_the_buffers_of_one_state_into_those_of_the_other() {
+    for name in ["scan", "quad-sphere", "cad"] {
+        let pm = build(sample(name, 1500, 5), &options(Method::Quadric, None), &Quiet).unwrap().mesh;
+        let n = pm.splits.len();
+        let mut c = pm.cursor().unwrap();
+        let (mut indices, mut vertices) = buffers(&c);
+        let mut patch = Patch::default();
+        for to in [n / 3, n / 2, n / 5, n, n - 1, n / 2, 0, 3] {
+            c.seek_with_patch(to, &mut patch).unwrap();
+            let (now, wedges) = buffers(&c);
+            indices.truncate(patch.faces_now);
+            indices.extend_from_slice(&now[indices.len()..]);
+            for &k in &patch.indices {
+                indices[k as usize / 3][k as usize % 3] = now[k as usize / 3][k as usize % 3];
+            }
+            vertices.truncate(patch.wedges_now);
+            vertices.extend_from_slice(&wedges[vertices.len()..]);
+            patch.wedges.iter().for_each(|&w| vertices[w as usize] = wedges[w as usize].clone());
+            assert!(patch.indices.is_sorted_by(|a, b| a < b) && patch.wedges.is_sorted_by(|a, b| a < b));
+            assert_eq!(indices, now, "{name} to {to}");
+            assert_eq!(vertices, wedges, "{name} to {to}");
+        }
+    }
+}
+
+#[test]
+fn several_meshes_take_turns_as_their_collapses_did() {
+    let meshes = vec![sample("scan", 1500, 1), sample("sphere", 800, 1), sample("cad", 900, 1)];
+    let scales = [1.0, 0.5, 2.0];
+    let mut o = options(Method::Quadric, None);
+    o.schedule = Some(Schedule::Exact);
+    let all = build_all(meshes.clone(), &scales, &o, &Quiet).unwrap();
+    assert_eq!(all.turns.len(), all.meshes.iter().map(|m| m.splits.len()).sum::<usize>());
+    // The coarsest states of all together are those of a run that stops there.
+    let first = all.turns.len() / 4;
+    let mut counts = [0; 3];
+    all.turns[..first].iter().for_each(|&m| counts[m as usize] += 1);
+    let faces: Vec<usize> = all
+        .meshes
+        .iter()
+        .zip(counts)
+        .map(|(pm, k)| {
+            let mut c = pm.cursor().unwrap();
+            c.seek(k).unwrap();
+            c.face_count()
+        })
+        .collect();
+    let mut simplified = meshes;
+    o.triangles = Some(faces.iter().sum());
+    progmesh_refine::simplify::simplify_all(&mut simplified, &scales, &o, &Quiet).unwrap();
+    assert_eq!(simplified.iter().map(Mesh::face_count).collect::<Vec<_>>(), faces);
+}
+
+#[test]
+fn errors_nest_and_seeking_by_error_finds_the_coarsest_state() {
+    let pm = build(sample("scan", 3000, 4), &options(Method::Quadric, None), &Quiet).unwrap().mesh;
+    let mut c = pm.cursor().unwrap();
+    let mut last = usize::MAX;
+    for k in [0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1.0] {
+        c.seek_error(k).unwrap();
+        assert!(pm.splits.error[c.position()..].iter().all(|&e| e as f64 <= k));
+        assert!(c.position() == 0 || pm.splits.error[c.position() - 1] as f64 > k);
+        assert!(c.position() <= last);
+        last = c.position();
+    }
+    assert_eq!(last, 0);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn wherever_a_cursor_wanders_it_finds_what_a_fresh_one_finds(
+        name in 0..NAMES.len(),
+        faces in 200..900usize,
+        seed in 0..1000u64,
+        run in 0..6usize,
+        walk in prop::collection::vec(0.0..1.0f64, 1..8),
+    ) {
+        let mesh = sample(NAMES[name], faces, seed);
+        let input = mesh.to_input();
+        let pm = build(mesh, &runs()[run], &Quiet).unwrap().mesh;
+        let mut c = pm.cursor().unwrap();
+        for x in walk {
+            let to = (x * (pm.splits.len() + 1) as f64) as usize;
+            c.seek(to).unwrap();
+            let mut fresh = pm.cursor().unwrap();
+            fresh.seek(to).unwrap();
+            prop_assert_eq!(buffers(&c), buffers(&fresh));
+            assert_valid(&c);
+        }
+        c.seek(usize::MAX).unwrap();
+        assert_same(&c.to_ordered_input(), &input);
+    }
+}

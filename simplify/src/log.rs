@@ -1,0 +1,203 @@
+//! A simplification that remembers its collapses: what a progressive mesh (Hoppe 1996) is made of.
+
+use crate::finish::target;
+use crate::options::{Control, Level, Method, Options, SimplifyError, Stop};
+use crate::work::wedge_at;
+use crate::{nsa, quadric_collapse};
+use glam::DVec3;
+use progmesh_aif::{CollapseRecord, EdgeId, FaceId, Mesh, NONE, Topology, VertexId, Wedges};
+
+/// A triangle that a collapse removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LoggedWing {
+    /// The triangle; [`NONE`] where the collapsed edge had none.
+    pub face: u32,
+    /// The face across its side at the kept vertex, and which edge of it that is: `face * 4 + edge`. [`NONE`] where there is none, or where
+    /// three and more faces meet at that side.
+    pub kept_half: u32,
+    /// The same across its side at the removed vertex.
+    pub removed_half: u32,
+    /// Which edge of the triangle was collapsed, 0..3.
+    pub slot: u8,
+    /// The triangle runs along that edge from the kept vertex to the removed one.
+    pub kept_first: bool,
+    /// The face of `kept_half` begins that edge at the kept vertex.
+    pub kept_half_starts: bool,
+    /// The face of `removed_half` begins that edge at the (then) removed vertex.
+    pub removed_half_starts: bool,
+}
+
+impl LoggedWing {
+    const NO: LoggedWing = LoggedWing {
+        face: NONE,
+        kept_half: NONE,
+        removed_half: NONE,
+        slot: 0,
+        kept_first: false,
+        kept_half_starts: false,
+        removed_half_starts: false,
+    };
+}
+
+/// A collapse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoggedCollapse {
+    /// The vertex that stayed.
+    pub kept: u32,
+    /// The vertex that went.
+    pub removed: u32,
+    /// The triangles on the edge; the second has no face at a border.
+    pub wings: [LoggedWing; 2],
+    /// Where the kept vertex was, model units, not yet rounded to the stored precision.
+    pub old_position: DVec3,
+    /// The method's estimate of the error here, model units.
+    pub error: f32,
+    /// Triangles that were left over all meshes of the run before this collapse: orders the collapses of several meshes.
+    pub left: u32,
+}
+
+/// The collapses of a mesh, in order.
+///
+/// A removed vertex keeps the position and the wedges it had when it went; with this log, every state before can be told.
+#[derive(Clone, Debug, Default)]
+pub struct CollapseLog {
+    /// One entry a collapse.
+    pub steps: Vec<LoggedCollapse>,
+    /// Ends of every step's runs in `corners` and `rows`; empty without wedges.
+    pub ends: Vec<(u32, u32)>,
+    /// Corner slots of the removed vertex, and the wedges they had.
+    pub corners: Vec<(u32, u32)>,
+    /// Wedges of the kept vertex beside the edge, and the channels they had.
+    pub rows: Vec<(u32, u64)>,
+    /// The values they had, row after row.
+    pub values: Vec<f32>,
+}
+
+/// What [`record_all`] says of a mesh.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Recorded {
+    /// Its collapses.
+    pub log: CollapseLog,
+    /// Estimated error, model units.
+    pub estimate: f64,
+    /// NSA: the passes that made collapses. Quadric: the whole run.
+    pub levels: Vec<Level>,
+}
+
+/// As [`crate::simplify_all`], by edge collapse, with every collapse remembered. The meshes are not compacted: removed elements stay
+/// in place as they were when they went, vertices without an edge stay.
+///
+/// Errors: an option out of its range, pruning, clustering (which is no sequence of collapses), a mesh with other faces than triangles (cut
+/// them first: [`Mesh::triangulate`]). Nothing has happened to the meshes then. Panics if `scales` has another length than `meshes`.
+pub fn record_all(
+    meshes: &mut [Mesh],
+    scales: &[f64],
+    options: &Options,
+    control: &dyn Control,
+) -> Result<(Stop, Vec<Recorded>), SimplifyError> {
+    assert_eq!(meshes.len(), scales.len(), "one scale for each mesh");
+    crate::validate(options)?;
+    meshes.iter().try_for_each(|m| crate::work::check_weights(m, options))?;
+    if options.prune.is_some() {
+        return Err(SimplifyError::NotRecorded("removing small components"));
+    }
+    if meshes.iter().any(|m| !m.topology().is_triangular()) {
+        return Err(SimplifyError::NotRecorded("collapsing edges of polygons"));
+    }
+    match options.method {
+        Method::Quadric => quadric_collapse::record_all(meshes, scales, options, control),
+        Method::Nsa => {
+            let goal = target(options, meshes.iter().map(Mesh::triangle_count).sum());
+            nsa::record_all(meshes, scales, options, goal, control)
+        }
+        Method::Cluster => Err(SimplifyError::NotRecorded("vertex clustering")),
+    }
+}
+
+impl CollapseLog {
+    /// Writes down the wedges that merging may change, before it does.
+    pub(crate) fn note_wedges(&mut self, mesh: &Mesh, e: EdgeId, kept: VertexId, removed: VertexId) {
+        let Some(wedges) = mesh.wedges() else { return };
+        note_wedges(mesh, wedges, e, (kept, removed), &mut self.corners, &mut self.rows, &mut self.values);
+        self.ends.push((self.corners.len() as u32, self.rows.len() as u32));
+    }
+
+    /// Adds a collapse that has just been made of `t`.
+    pub(crate) fn push(
+        &mut self,
+        t: &Topology,
+        record: &CollapseRecord,
+        old_position: DVec3,
+        error: f32,
+        left: usize,
+    ) {
+        let mut wings = [LoggedWing::NO; 2];
+        for (to, wing) in wings.iter_mut().zip(record.wings()) {
+            *to = look_at_wing(t, wing, record.kept, record.edge);
+        }
+        let (kept, removed) = (record.kept.0, record.removed.0);
+        self.steps.push(LoggedCollapse { kept, removed, wings, old_position, error, left: left as u32 });
+    }
+}
+
+/// The faces across the sides of a removed triangle, which share one edge now.
+#[inline]
+fn look_at_wing(t: &Topology, wing: &progmesh_aif::Wing, kept: VertexId, edge: EdgeId) -> LoggedWing {
+    let half = |g: FaceId| {
+        let uses = t.face_edges(g);
+        let i = if uses[0].edge() == wing.kept_edge {
+            0
+        } else if uses[1].edge() == wing.kept_edge {
+            1
+        } else {
+            2
+        };
+        (g.0 * 4 + i as u32, t.origin(uses[i]) == kept)
+    };
+    // What is gone keeps its relations: the merged edge still names the face it lost.
+    let beyond = t.edge_faces(wing.removed_edge).iter().copied().find(|&g| g != wing.face);
+    let now = t.edge_faces(wing.kept_edge);
+    let beside = now.iter().copied().find(|&g| Some(g) != beyond).filter(|_| now.len() <= 2);
+    let beyond = beyond.map(half);
+    let beside = beside.map(half);
+    let slot = wing.slot as usize;
+    let run = t.face_edges(wing.face)[slot];
+    debug_assert_eq!(run.edge(), edge);
+    LoggedWing {
+        face: wing.face.0,
+        kept_half: beside.map_or(NONE, |h| h.0),
+        removed_half: beyond.map_or(NONE, |h| h.0),
+        slot: slot as u8,
+        kept_first: t.origin(run) == kept,
+        kept_half_starts: beside.is_some_and(|h| h.1),
+        removed_half_starts: beyond.is_some_and(|h| h.1),
+    }
+}
+
+/// Appends the corners of the removed vertex with their wedges, and the kept vertex's wedges on the faces of `e` with their values.
+pub(crate) fn note_wedges(
+    mesh: &Mesh,
+    wedges: &Wedges,
+    e: EdgeId,
+    (kept, removed): (VertexId, VertexId),
+    corners: &mut Vec<(u32, u32)>,
+    rows: &mut Vec<(u32, u64)>,
+    values: &mut Vec<f32>,
+) {
+    let t = mesh.topology();
+    for f in t.vertex_faces(removed) {
+        let start = t.corner_range(f).start;
+        if let Some(i) = t.face_vertices(f).position(|v| v == removed) {
+            corners.push(((start + i) as u32, wedges.corner[start + i]));
+        }
+    }
+    let first = rows.len();
+    for &f in t.edge_faces(e) {
+        let w = wedge_at(mesh, wedges, f, kept);
+        if w != NONE && !rows[first..].iter().any(|r| r.0 == w) {
+            rows.push((w, wedges.present(w)));
+            values.extend_from_slice(wedges.row(w));
+        }
+    }
+}
