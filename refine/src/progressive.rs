@@ -10,10 +10,12 @@ mod build;
 mod cursor;
 mod input;
 mod links;
+mod order;
 
 pub use build::{Built, BuiltAll, EncodeError, build, build_all};
 pub use cursor::{Cursor, Damage, Patch};
 pub use input::{InputOrder, Polygons, same_positions};
+pub use order::NotInOrder;
 
 use crate::aif::{Channel, NONE, Positions};
 
@@ -118,6 +120,18 @@ impl SplitCode {
     }
 }
 
+/// The wedges of the old vertex on the left and on the right of a seam that is to run through the new one: those at both ends of the run of
+/// faces that go there, unless these are one, as when the seam turns off at `vl` or `vr`; then the face beyond the cut tells the other.
+#[inline]
+fn seam_wedges(first: u32, last: u32, outer_l: Option<u32>, outer_r: Option<u32>) -> (u32, u32) {
+    match (outer_l, outer_r) {
+        _ if first != last => (first, last),
+        (Some(o), _) if o != first => (o, last),
+        (_, Some(o)) if o != first => (first, o),
+        _ => (first, last),
+    }
+}
+
 #[inline]
 fn arrangement(bits: u16) -> (usize, bool) {
     const TABLE: [(usize, bool); 8] =
@@ -171,8 +185,8 @@ pub struct WedgeStreams {
     /// For every row the channels it has, bit k for channel k; a wedge that has none stands for "no attributes".
     pub present: Vec<u64>,
     /// For every explicit split: the number of pairs, of changed wedges; pairs (wedge before, wedge after) of the faces that go to the
-    /// new vertex, with new wedges numbered from the present count; the changed wedges; the wedges of `fl` at `vt`, `vu`, `vl`; the
-    /// same of `fr` if there is one.
+    /// new vertex, with new wedges numbered from the present count; the changed wedges; the wedges of `fl` at `vt`, `vu`, `vl` (the last
+    /// [`NONE`] where the neighbour that the code names has it); the same of `fr` if there is one.
     pub explicit: Vec<u32>,
 }
 

@@ -69,8 +69,12 @@ fn assert_same(a: &MeshInput, b: &MeshInput) {
     }
 }
 
-/// What a vertex buffer and an index buffer hold, as bits.
-fn buffers(c: &Cursor<&ProgressiveMesh>) -> (Vec<[u32; 3]>, Vec<([u64; 3], u64, Vec<u32>)>) {
+/// What an index buffer and a vertex buffer hold, as bits.
+type Buffers = (Vec<[u32; 3]>, Vec<Slot>);
+/// Position, channels present, values.
+type Slot = ([u64; 3], u64, Vec<u32>);
+
+fn buffers(c: &Cursor<&ProgressiveMesh>) -> Buffers {
     let wedge = |w: u32| {
         let row = c.row(w).iter().map(|x| x.to_bits()).collect();
         (c.positions().get(c.wedge_vertex(w) as usize).to_array().map(f64::to_bits), c.present(w), row)
@@ -279,5 +283,81 @@ proptest! {
         }
         c.seek(usize::MAX).unwrap();
         assert_same(&c.to_ordered_input(), &input);
+    }
+}
+
+#[test]
+fn new_places_lie_on_the_grid_that_was_asked_for() {
+    let mut o = options(Method::Quadric, Some(Placement::Optimal));
+    let cell = (-12f64).exp2();
+    o.grid = Some(cell);
+    for (mesh, double) in [(sample("scan", 2000, 9), false), (sample("torus", 2000, 9), true)] {
+        let mut input = mesh.to_input();
+        if double {
+            input.positions = Positions::F64(mesh.positions().iter().map(|p| (p * 1.1).to_array()).collect());
+        }
+        let mesh = Mesh::build(input.clone(), &BuildOptions::default()).unwrap().0;
+        let pm = build(mesh, &o, &Quiet).unwrap().mesh;
+        assert!(pm.moved_positions.len() > 500);
+        let mut c = pm.cursor().unwrap();
+        let inner = pm.splits.code[0].moves() as usize + pm.base_vertices() / 2;
+        let on_grid = |p: glam::DVec3| (p / cell).to_array().iter().all(|x| x.fract() == 0.0);
+        assert!(c.positions().iter().filter(|&p| on_grid(p)).count() >= inner.min(c.vertex_count()) / 2);
+        c.seek(usize::MAX).unwrap();
+        assert_same(&c.to_ordered_input(), &input);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    /// The l/r rule: whatever order respects the dependencies refines to the same mesh.
+    #[test]
+    fn any_order_that_respects_the_dependencies_leads_to_the_input(
+        name in 0..NAMES.len(),
+        seed in 0..1000u64,
+        run in 0..6usize,
+        shuffle in 1..u64::MAX,
+    ) {
+        let mesh = sample(NAMES[name], 700, seed);
+        let input = mesh.to_input();
+        let pm = build(mesh, &runs()[run], &Quiet).unwrap().mesh;
+        // Kahn's algorithm, the next split drawn at random.
+        let on = pm.dependencies();
+        let mut missing: Vec<usize> = on.iter().map(|d| d.iter().filter(|&&d| d != NONE).count()).collect();
+        let mut dependents = vec![Vec::new(); on.len()];
+        for (i, d) in on.iter().enumerate() {
+            d.iter().filter(|&&d| d != NONE).for_each(|&d| dependents[d as usize].push(i));
+        }
+        let mut ready: Vec<usize> = (0..on.len()).filter(|&i| missing[i] == 0).collect();
+        let (mut order, mut state) = (Vec::new(), shuffle);
+        while !ready.is_empty() {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            let i = ready.swap_remove((state >> 33) as usize % ready.len());
+            order.push(i as u32);
+            for &d in &dependents[i] {
+                missing[d] -= 1;
+                if missing[d] == 0 {
+                    ready.push(d);
+                }
+            }
+        }
+        let other = pm.reordered(&order).unwrap();
+        let mut c = other.cursor().unwrap();
+        let base = buffers(&c);
+        c.seek(other.splits.len() / 2).unwrap();
+        assert_valid(&c);
+        c.seek(usize::MAX).unwrap();
+        assert_same(&c.to_ordered_input(), &input);
+        c.seek(0).unwrap();
+        prop_assert_eq!(buffers(&c), base);
+        // Back again.
+        let mut back = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(k, &i)| back[i as usize] = k as u32);
+        let again = other.reordered(&back).unwrap();
+        prop_assert_eq!(&again.splits, &pm.splits);
+        prop_assert_eq!(&again.wedges, &pm.wedges);
+        order.swap(0, pm.splits.len() - 1);
+        prop_assert!(pm.reordered(&order).is_err() || on.len() < 3);
     }
 }

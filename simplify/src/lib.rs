@@ -98,6 +98,7 @@ fn validate(options: &Options) -> Result<(), SimplifyError> {
     };
     within("ratio", options.ratio, 1.0, "0 to 1")?;
     within("prune", options.prune, 1.0, "0 to 1")?;
+    within("grid", options.grid, f64::MAX, "finite and not negative")?;
     within("max_error", options.max_error.map(|b| b.value), f64::MAX, "finite and not negative")?;
     within("epsilon", options.epsilon, 180.0, "0 to 180 degrees")
 }

@@ -65,6 +65,9 @@ pub struct Options {
     pub epsilon: Option<f64>,
     /// NSA: at most this many passes.
     pub passes: Option<usize>,
+    /// New places lie on the grid of multiples of this length, model units, not negative: cheaper to encode, moved by up to 0.87 of it. A power
+    /// of two keeps them exact. Endpoint placement makes no new places. `None` or 0: anywhere.
+    pub grid: Option<f64>,
     /// No vertex on a border moves or goes. (NSA never touches the border.)
     pub lock_border: bool,
     /// Index-only: no vertex moves, survivors keep their ids, and all vertices stay in the mesh, so that every level can share one

@@ -36,6 +36,8 @@ pub(crate) struct Work<'m> {
     pub(crate) scale: f64,
     /// Bounding-box diagonal in model units.
     pub(crate) diagonal: f64,
+    /// Side of the grid's cells in model units, if new places lie on a grid.
+    grid: Option<f64>,
     pub(crate) kinds: Vec<Kind>,
     pub(crate) seams: Bits,
     /// Vertices whose position is no longer the input's.
@@ -64,6 +66,7 @@ impl<'m> Work<'m> {
             centre,
             scale,
             diagonal,
+            grid: options.grid.filter(|&g| g > 0.0),
             kinds: Vec::new(),
             seams,
             moved: Bits::new(slots),
@@ -150,17 +153,20 @@ impl<'m> Work<'m> {
 
     /// Where `v` is, model units, as [`Work::write_back`] will write it.
     pub(crate) fn model_position(&self, v: VertexId) -> DVec3 {
-        if self.moved.get(v.index()) {
-            self.points[v.index()] / self.scale + self.centre
-        } else {
-            self.mesh.position(v)
-        }
+        if self.moved.get(v.index()) { self.new_place(self.points[v.index()]) } else { self.mesh.position(v) }
+    }
+
+    /// A local point in model units, on the grid if there is one.
+    #[inline]
+    fn new_place(&self, p: DVec3) -> DVec3 {
+        let q = p / self.scale + self.centre;
+        self.grid.map_or(q, |g| (q / g).round() * g)
     }
 
     /// A local point in model units, rounded to the precision of the mesh.
     #[inline]
     pub(crate) fn to_model(&self, p: DVec3) -> DVec3 {
-        self.mesh.positions().round(p / self.scale + self.centre)
+        self.mesh.positions().round(self.new_place(p))
     }
 
     /// A point in model units as a local one.
@@ -175,9 +181,10 @@ impl<'m> Work<'m> {
     pub(crate) fn round(&self, p: DVec3) -> DVec3 {
         match self.mesh.positions() {
             Positions::F32(_) => {
-                let q = self.mesh.positions().round(p / self.scale + self.centre);
+                let q = self.mesh.positions().round(self.new_place(p));
                 (q - self.centre) * self.scale
             }
+            Positions::F64(_) if self.grid.is_some() => (self.new_place(p) - self.centre) * self.scale,
             Positions::F64(_) if (p / self.scale + self.centre).is_finite() => p,
             Positions::F64(_) => DVec3::NAN,
         }
@@ -187,7 +194,7 @@ impl<'m> Work<'m> {
     pub(crate) fn write_back(&mut self) {
         for v in 0..self.points.len() {
             if self.moved.get(v) {
-                let p = self.points[v] / self.scale + self.centre;
+                let p = self.new_place(self.points[v]);
                 self.mesh.positions_mut().set(v, p);
             }
         }

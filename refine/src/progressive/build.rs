@@ -376,8 +376,15 @@ impl<'a> WedgeReplay<'a> {
         };
         // Coarse wedges at both ends of the run of faces that go to the new vertex.
         let first = if l.removed_half != NONE { l.removed_half } else { l.kept_half };
-        let x_l = corner_at(&self.wedges, first);
-        let x_r = if two && r.removed_half != NONE { corner_at(&self.wedges, r.removed_half) } else { x_l };
+        let mut x_l = corner_at(&self.wedges, first);
+        let mut x_r =
+            if two && r.removed_half != NONE { corner_at(&self.wedges, r.removed_half) } else { x_l };
+        let [plain_l, plain_r] = [x_l, x_r];
+        if two {
+            let outer =
+                |wing: &LoggedWing| (wing.kept_half != NONE).then(|| corner_at(&self.wedges, wing.kept_half));
+            (x_l, x_r) = super::seam_wedges(x_l, x_r, outer(l), outer(r));
+        }
         // Pairs (coarse, fine) over those faces, the removed ones left out.
         let wing_face = |c: u32| c / 3 == l.face || (two && c / 3 == r.face);
         let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(2);
@@ -413,7 +420,7 @@ impl<'a> WedgeReplay<'a> {
             [vt, vu, at((wing.slot as usize + 2) % 3)]
         };
         let fl = of_wing(l);
-        let fr = if two { of_wing(r) } else { [x_l, fl[1], NONE] };
+        let fr = if two { of_wing(r) } else { [plain_l, fl[1], NONE] };
         // New wedges that only the new faces have.
         for w in [(fl[0], fl[1]), (fr[0], fr[1])] {
             if self.slot[w.1 as usize] == NONE && !pairs.iter().any(|p| p.1 == w.1) {
@@ -440,11 +447,12 @@ impl<'a> WedgeReplay<'a> {
         let fresh = |w: u32| self.slot[w as usize] == NONE;
         let within = |allowed: &[u32]| changed.iter().all(|w| allowed.contains(w));
         let plain = pairs.len() == 1
-            && pairs[0] == (x_l, fl[1])
+            && plain_l == plain_r
+            && pairs[0] == (plain_l, fl[1])
             && fresh(fl[1])
-            && fl[0] == x_l
-            && fr[..2] == [x_l, fl[1]]
-            && within(&[x_l]);
+            && fl[0] == plain_l
+            && fr[..2] == [plain_l, fl[1]]
+            && within(&[plain_l]);
         let seam = two
             && pairs.len() == 2
             && x_l != x_r
@@ -457,22 +465,20 @@ impl<'a> WedgeReplay<'a> {
             && fr[0] == x_r
             && within(&[x_l, x_r]);
         let mut bits = 0;
-        let (new, changed) = match (tip_l, tip_r) {
-            (Some(a), Some(b)) if plain || seam => {
-                bits |=
-                    if a { SplitCode::L_TIP_INNER } else { 0 } | if b { SplitCode::R_TIP_INNER } else { 0 };
-                bits |= (seam as u16) << SplitCode::KIND;
-                let changed = match (changed.is_empty(), plain) {
-                    (true, _) => vec![],
-                    (_, true) => vec![x_l],
-                    _ => vec![x_l, x_r],
-                };
-                (if plain { vec![fl[1]] } else { vec![fl[1], fr[1]] }, changed)
-            }
-            _ => {
-                bits |= 2 << SplitCode::KIND;
-                (pairs.iter().map(|p| p.1).filter(|&w| fresh(w)).collect(), changed.clone())
-            }
+        bits |= if tip_l == Some(true) { SplitCode::L_TIP_INNER } else { 0 };
+        bits |= if tip_r == Some(true) { SplitCode::R_TIP_INNER } else { 0 };
+        let simple = tip_l.is_some() && tip_r.is_some() && (plain || seam);
+        let (new, changed) = if simple {
+            bits |= (!plain as u16) << SplitCode::KIND;
+            let changed = match (changed.is_empty(), plain) {
+                (true, _) => vec![],
+                (_, true) => vec![plain_l],
+                _ => vec![x_l, x_r],
+            };
+            (if plain { vec![fl[1]] } else { vec![fl[1], fr[1]] }, changed)
+        } else {
+            bits |= 2 << SplitCode::KIND;
+            (pairs.iter().map(|p| p.1).filter(|&w| fresh(w)).collect(), changed.clone())
         };
         for &w in &new {
             self.slot[w as usize] = self.count;
@@ -491,9 +497,13 @@ impl<'a> WedgeReplay<'a> {
             out.extend([pairs.len() as u32, changed.len() as u32]);
             out.extend(pairs.iter().flat_map(|p| [slot(p.0), slot(p.1)]));
             out.extend(changed.iter().map(|&w| slot(w)));
-            out.extend(fl.map(slot));
+            // Tips by their neighbours where that tells them: it holds in any order of the splits.
+            let with_tip = |c: [u32; 3], rule: Option<bool>| {
+                [slot(c[0]), slot(c[1]), if rule.is_some() { NONE } else { slot(c[2]) }]
+            };
+            out.extend(with_tip(fl, tip_l));
             if two {
-                out.extend(fr.map(slot));
+                out.extend(with_tip(fr, tip_r));
             }
         }
         bits
@@ -526,31 +536,15 @@ impl InputOrder {
     }
 }
 
-/// Raises errors so that no split's passes that of one it depends on: of the last before at its vertex, and those that made its cuts' faces.
+/// Raises errors so that no split's passes that of one it depends on.
 fn nest_errors(pm: &mut ProgressiveMesh) {
-    let n0 = pm.base_vertices();
-    let n = pm.splits.len();
-    let mut maker = vec![NONE; pm.base_faces.len()];
-    let mut last = vec![NONE; n0];
-    let mut before = vec![NONE; n];
-    for i in 0..n {
-        let v = pm.splits.vertex[i] as usize;
-        before[i] = std::mem::replace(&mut last[v], i as u32);
-        last.push(i as u32);
-        maker.push(i as u32);
-        if pm.splits.code[i].two_faces() {
-            maker.push(i as u32);
-        }
-    }
-    let s = &mut pm.splits;
-    for i in (0..n).rev() {
-        let error = s.error[i];
-        let cut = |half: u32| maker.get((half >> 2) as usize).copied().unwrap_or(NONE);
-        for d in [before[i], cut(s.left[i]), if s.right[i] == NONE { NONE } else { cut(s.right[i]) }] {
-            if d != NONE {
-                let e = &mut s.error[d as usize];
-                *e = e.max(error);
-            }
+    let on = pm.dependencies();
+    let error = &mut pm.splits.error;
+    for i in (0..on.len()).rev() {
+        let least = error[i];
+        for d in on[i].into_iter().filter(|&d| d != NONE) {
+            let e = &mut error[d as usize];
+            *e = e.max(least);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A mesh between base and full detail.
 
 use super::links::{Half, across, link, link_faces, next, previous};
-use super::{ProgressiveMesh, SplitKind};
+use super::{ProgressiveMesh, SplitKind, seam_wedges};
 use crate::aif::{MeshInput, NONE, Positions, Wedges};
 use std::ops::Deref;
 
@@ -311,7 +311,7 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
         // Wedges: of the old vertex left and right, and what becomes of them at the new one.
         let kind = code.kind();
         let at_vertex = |h: Half| self.corners[h.face as usize][h.corner()];
-        let (first_new, x_l) = match inner_l.or(outer_l) {
+        let (first_new, mut x_l) = match inner_l.or(outer_l) {
             Some(h) => (self.wedge_count() as u32, at_vertex(h)),
             None => return Err(Damage::Fan(i)),
         };
@@ -348,7 +348,10 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
         if code.two_faces() && last.is_none() {
             return Err(Damage::Fan(i));
         }
-        let x_r = last.map_or(x_l, at_vertex);
+        let mut x_r = last.map_or(x_l, at_vertex);
+        if kind == SplitKind::Seam {
+            (x_l, x_r) = seam_wedges(x_l, x_r, outer_l.map(at_vertex), beyond_last.map(at_vertex));
+        }
         let (mut pairs, mut many): (Pairs, Vec<(u32, u32)>) =
             ([(x_l, first_new), (x_r, first_new + 1)], Vec::new());
         let mut new_wedges = 1;
@@ -373,7 +376,9 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
                 let end = first_new + new_wedges;
                 let known = |w: &u32| *w < end;
                 let all = e.pairs.iter().flat_map(|p| [p.0, p.1]).chain(e.changed.iter().copied());
-                if let Some(to) = all.chain(e.corners.iter().flatten().copied()).find(|w| !known(w)) {
+                if let Some(to) =
+                    all.chain(e.corners.iter().flatten().copied().filter(|&w| w != NONE)).find(|w| !known(w))
+                {
                     return Err(Damage::Reference { what: "explicit split", at: i, to });
                 }
                 corners_of = [e.corners[0], e.corners.get(1).copied().unwrap_or([NONE; 3])];
@@ -472,12 +477,14 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
             let (a, b) = if from_inner { (inner, outer) } else { (outer, inner) };
             a.or(b).map_or(NONE, |h| corners[h.face as usize][h.far_corner()])
         };
+        let vl = tip(&self.corners, outer_l, inner_l, code.left_tip_inner());
+        let vr = tip(&self.corners, beyond_last, last, code.right_tip_inner());
         if kind != SplitKind::Explicit {
-            let vl = tip(&self.corners, outer_l, inner_l, code.left_tip_inner());
-            corners_of[0] = [x_l, pairs[0].1, vl];
-            if code.two_faces() {
-                let vr = tip(&self.corners, beyond_last, last, code.right_tip_inner());
-                corners_of[1] = [pairs[1].0, pairs[1].1, vr];
+            corners_of = [[x_l, pairs[0].1, vl], [pairs[1].0, pairs[1].1, vr]];
+        }
+        for (corners, tip) in corners_of.iter_mut().zip([vl, vr]) {
+            if corners[2] == NONE {
+                corners[2] = tip;
             }
         }
         let left_mid = self.insert(fl, code.left(), corners_of[0], outer_l, inner_l);

@@ -64,11 +64,8 @@ pub(super) fn link(from: Half, to: Half) -> u32 {
 /// Where `link`, which stands at `from`, leads, seen from the same vertex.
 #[inline]
 pub(super) fn across(from: Half, link: u32) -> Option<Half> {
-    (link != NONE).then(|| Half {
-        face: link >> 3,
-        edge: link & 3,
-        starts: from.starts == (link >> 2 & 1 == 1),
-    })
+    let to = Half { face: link >> 3, edge: link & 3, starts: from.starts == (link >> 2 & 1 == 1) };
+    Some(to).filter(|_| link != NONE)
 }
 
 /// The links of faces given by the vertices of their corners. Edges of exactly two faces are linked. O(n log n) at worst.

@@ -1,0 +1,198 @@
+//! What splits depend on, and the same progressive mesh with its splits in another order.
+//!
+//! A split needs its vertex as it is then, and both faces on each of its cuts. Of two adjacent faces the later was made beside the earlier, so
+//! the later of each pair stands for both: three splits at most. Every order in which no split comes before one it depends on leads to
+//! the same mesh (the l/r rule; `tests/progressive.rs` holds it to random orders).
+
+use super::{ProgressiveMesh, SplitKind};
+use crate::aif::{NONE, Positions};
+
+/// The order asked for is none of all splits, or puts a split before one it depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("split {0} cannot come where the order puts it")]
+pub struct NotInOrder(pub u32);
+
+impl ProgressiveMesh {
+    /// For every split those it depends on directly, [`NONE`] for the base: the last before at its vertex (or that made it), the makers of
+    /// its left and right cuts' faces. O(n).
+    pub fn dependencies(&self) -> Vec<[u32; 3]> {
+        let s = &self.splits;
+        let mut maker = vec![NONE; self.base_faces.len()];
+        let mut last = vec![NONE; self.base_vertices()];
+        let mut all = Vec::with_capacity(s.len());
+        for (i, ((&v, &code), (&l, &r))) in
+            (0u32..).zip(s.vertex.iter().zip(&s.code).zip(s.left.iter().zip(&s.right)))
+        {
+            let of = |cut: u32| maker.get((cut >> 2) as usize).copied().unwrap_or(NONE);
+            let right = if r == NONE { NONE } else { of(r) };
+            let before = last.get_mut(v as usize).map_or(NONE, |l| std::mem::replace(l, i));
+            all.push([before, of(l), right]);
+            last.push(i);
+            maker.push(i);
+            if code.two_faces() {
+                maker.push(i);
+            }
+        }
+        all
+    }
+
+    /// The same with split `order[k]` as the `k`-th; vertices, faces and wedges that splits make are renumbered. Levels are left out, as they stand
+    /// for no states any more. O(n).
+    ///
+    /// Errors: `order` is no permutation of the splits, or puts one before one it depends on.
+    pub fn reordered(&self, order: &[u32]) -> Result<ProgressiveMesh, NotInOrder> {
+        let (s, n) = (&self.splits, self.splits.len());
+        let mut rank = vec![NONE; n];
+        for (k, &i) in order.iter().enumerate() {
+            match rank.get_mut(i as usize) {
+                Some(r) if *r == NONE => *r = k as u32,
+                _ => return Err(NotInOrder(i)),
+            }
+        }
+        if let Some(missing) = rank.iter().position(|&r| r == NONE) {
+            return Err(NotInOrder(missing as u32));
+        }
+        for (i, on) in self.dependencies().into_iter().enumerate() {
+            if on.into_iter().any(|d| d != NONE && rank[d as usize] >= rank[i]) {
+                return Err(NotInOrder(i as u32));
+            }
+        }
+        // First face and first row of every split, before and after.
+        let (m0, n0) = (self.base_faces.len() as u32, self.base_vertices() as u32);
+        let faces_of = |i: usize| 1 + s.code[i].two_faces() as u32;
+        let rows = self.rows_of_splits();
+        let base_wedges = self.wedges.as_ref().map_or(n0, |w| w.base_vertex.len() as u32);
+        let mut face = vec![0; n];
+        let mut wedge = vec![0; n];
+        let (mut f, mut w) = (m0, base_wedges);
+        for &i in order {
+            (face[i as usize], wedge[i as usize]) = (f, w);
+            f += faces_of(i as usize);
+            w += rows[i as usize].new;
+        }
+        let mut new_face: Vec<u32> = (0..m0).collect();
+        let mut new_wedge: Vec<u32> = (0..base_wedges).collect();
+        for i in 0..n {
+            new_face.extend((0..faces_of(i)).map(|k| face[i] + k));
+            new_wedge.extend((0..rows[i].new).map(|k| wedge[i] + k));
+        }
+        let cut = |c: u32| match new_face.get((c >> 2) as usize) {
+            Some(&f) if c != NONE => f << 2 | c & 3,
+            _ => c,
+        };
+        let vertex = |v: u32| if v < n0 { v } else { n0 + rank[(v - n0) as usize] };
+        let by_face = |old: &[u32]| {
+            let mut new = vec![NONE; old.len()];
+            old.iter().zip(&new_face).for_each(|(&x, &f)| new[f as usize] = x);
+            new
+        };
+        let pick = |i: &u32| *i as usize;
+        let mut out = ProgressiveMesh {
+            base_faces: self.base_faces.clone(),
+            base_positions: self.base_positions.clone(),
+            new_positions: self.new_positions.gather(order),
+            moved_positions: self.moved_in_order(order),
+            face_material: by_face(&self.face_material),
+            face_group: by_face(&self.face_group),
+            wires: self.wires.clone(),
+            levels: vec![0, n as u32],
+            ..Default::default()
+        };
+        out.levels.dedup();
+        out.splits.vertex = order.iter().map(|i| vertex(s.vertex[pick(i)])).collect();
+        out.splits.left = order.iter().map(|i| cut(s.left[pick(i)])).collect();
+        out.splits.right = order.iter().map(|i| cut(s.right[pick(i)])).collect();
+        out.splits.code = order.iter().map(|i| s.code[pick(i)]).collect();
+        out.splits.error = order.iter().map(|i| s.error[pick(i)]).collect();
+        if let Some(streams) = &self.wedges {
+            let mut new = streams.clone();
+            new.rows.truncate(base_wedges as usize * streams.stride);
+            new.present.truncate(base_wedges as usize);
+            new.explicit.clear();
+            for &i in order {
+                let r = &rows[i as usize];
+                let range = r.first_row..r.first_row + (r.new + r.changed) as usize;
+                new.present.extend_from_slice(&streams.present[range.clone()]);
+                new.rows.extend_from_slice(
+                    &streams.rows[range.start * streams.stride..range.end * streams.stride],
+                );
+                let entry = &streams.explicit[r.explicit.clone()];
+                if let Some((counts, ids)) = entry.split_at_checked(2) {
+                    new.explicit.extend_from_slice(counts);
+                    new.explicit.extend(ids.iter().map(|&w| new_wedge.get(w as usize).copied().unwrap_or(w)));
+                }
+            }
+            out.wedges = Some(new);
+        }
+        if let Some(order) = &self.order {
+            let mut o = order.clone();
+            let by = |old: &[u32], new_slot: &dyn Fn(usize) -> usize| {
+                let mut new = vec![NONE; old.len()];
+                old.iter().enumerate().for_each(|(k, &x)| new[new_slot(k)] = x);
+                new
+            };
+            o.vertex = by(&order.vertex, &|v| vertex(v as u32) as usize);
+            o.face = by(&order.face, &|f| new_face[f] as usize);
+            o.wedge = by(&order.wedge, &|w| new_wedge[w] as usize);
+            out.order = Some(o);
+        }
+        Ok(out)
+    }
+
+    fn moved_in_order(&self, order: &[u32]) -> Positions {
+        let mut next = 0;
+        let slots: Vec<u32> = self
+            .splits
+            .code
+            .iter()
+            .map(|c| {
+                next += c.moves() as u32;
+                next.wrapping_sub(1)
+            })
+            .collect();
+        let moving = order.iter().filter(|&&i| self.splits.code[i as usize].moves());
+        let moved: Vec<u32> = moving.map(|&i| slots[i as usize]).collect();
+        self.moved_positions.gather(&moved)
+    }
+
+    /// Where every split's attributes are. O(n).
+    pub(crate) fn rows_of_splits(&self) -> Vec<RowsOf> {
+        let base = self.wedges.as_ref().map_or(0, |w| w.base_vertex.len());
+        let (mut row, mut at, mut wedge) = (base, 0, base as u32);
+        let s = &self.splits;
+        let each = s.code.iter().map(|&code| {
+            let mut of = RowsOf { first_row: row, new: 1, changed: 0, explicit: at..at };
+            match (code.kind(), &self.wedges) {
+                (SplitKind::Plain, _) => of.changed = code.changes_rows() as u32,
+                (SplitKind::Seam, _) => (of.new, of.changed) = (2, 2 * code.changes_rows() as u32),
+                (SplitKind::Explicit, w) => {
+                    let stream = w.as_ref().map_or(&[][..], |w| &w.explicit[at..]);
+                    let [pairs, changed] = [0, 1].map(|k| stream.get(k).copied().unwrap_or(0) as usize);
+                    let size = 2 + 2 * pairs + changed + 3 + 3 * code.two_faces() as usize;
+                    let fine = stream.get(2..2 + 2 * pairs).unwrap_or_default().chunks_exact(2).map(|p| p[1]);
+                    of.new = fine.filter(|&w| w >= wedge).count() as u32;
+                    of.changed = changed as u32;
+                    of.explicit = at..(at + size).min(at + stream.len());
+                }
+            }
+            if self.wedges.is_some() {
+                row += (of.new + of.changed) as usize;
+            }
+            (at, wedge) = (of.explicit.end, wedge + of.new);
+            of
+        });
+        each.collect()
+    }
+}
+
+/// Where a split's attributes are.
+#[derive(Clone, Debug)]
+pub(crate) struct RowsOf {
+    pub(crate) first_row: usize,
+    /// New wedges.
+    pub(crate) new: u32,
+    /// Wedges whose values change.
+    pub(crate) changed: u32,
+    /// Its entry of the explicit stream.
+    pub(crate) explicit: std::ops::Range<usize>,
+}
