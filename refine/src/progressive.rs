@@ -6,8 +6,10 @@
 //! Numbering: vertex slots `0..n0` are the base's, split `i` makes slot `n0 + i`. Faces `0..m0` are the base's, and every split appends one
 //! (at a border) or two. Corners name *wedges*, which are the slots of a vertex buffer: without attributes a wedge is its vertex.
 
+mod attributes;
 mod build;
 mod cursor;
+mod fans;
 mod input;
 mod links;
 mod order;
