@@ -229,11 +229,12 @@ pub fn simplify_scene(
 
     let triangulated: usize = outcomes.iter().map(|o| o.triangulated).sum();
     if triangulated > 0 {
-        warnings.push(format!("{triangulated} polygons were cut into triangles, which this method needs"));
+        let what = count(triangulated, "polygon");
+        warnings.push(format!("{what} cut into triangles, which this method needs"));
     }
     let isolated: usize = outcomes.iter().map(|o| o.isolated_removed).sum();
     if isolated > 0 {
-        warnings.push(format!("{isolated} vertices without a face were left out"));
+        warnings.push(format!("{} without a face left out", count(isolated, "vertex")));
     }
     let summary = Summary {
         faces_in,
@@ -312,14 +313,28 @@ impl Changes {
     }
 }
 
-/// `1 face`, `2 faces`.
+/// `1 face`, `2,000 faces`.
 pub fn count(n: usize, what: &str) -> String {
+    let number = thousands(n);
     match (n, what) {
         (1, _) => format!("1 {what}"),
-        (_, "vertex") => format!("{n} vertices"),
-        (_, "mesh") => format!("{n} meshes"),
-        _ => format!("{n} {what}s"),
+        (_, "vertex") => format!("{number} vertices"),
+        (_, "mesh") => format!("{number} meshes"),
+        _ => format!("{number} {what}s"),
     }
+}
+
+/// 1234567 as `1,234,567`.
+pub fn thousands(n: usize) -> String {
+    let digits = n.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
+    for (i, d) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(d);
+    }
+    out
 }
 
 /// The triangles asked for: of the scene, or of each mesh and added up.

@@ -5,6 +5,7 @@ use super::args::FormatName;
 use super::control::Interrupt;
 use progmesh::io::files::{self, Loaded, ReadError, WriteError};
 use progmesh::io::{EncodeOptions, Format, encode};
+pub(crate) use progmesh::pipeline::thousands;
 use progmesh::scene::Scene;
 use serde::Serialize;
 use std::borrow::Cow;
@@ -139,19 +140,6 @@ pub(crate) fn in_pool<R: Send>(
         .build()
         .map_err(|e| Failure::Usage(format!("--threads {n}: {e}")))?;
     pool.install(work)
-}
-
-/// 1234567 as `1,234,567`.
-pub(crate) fn thousands(n: usize) -> String {
-    let digits = n.to_string();
-    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
-    for (i, d) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(d);
-    }
-    out
 }
 
 /// A length or the like, in four digits.

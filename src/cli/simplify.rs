@@ -2,15 +2,17 @@
 
 use super::Failure;
 use super::args::{self, Input, Output, Shape};
-use super::common::{self, Warnings, short, thousands};
+use super::common::{self, Warnings, thousands};
 use super::control::{Interrupt, Progress};
 use super::picture::PictureArgs;
 use clap::ValueEnum;
-use progmesh::io::files;
-use progmesh::pipeline::{Job, JobError, Summary, count, simplify_scene};
+use progmesh::pipeline::{Job, JobError, count, simplify_scene};
 use progmesh::simplify::{self as engine, MaxError, SimplifyError, Stop};
-use serde::Serialize;
+use report::{Seconds, Triangles};
 use std::time::Instant;
+
+mod advice;
+mod report;
 
 /// Reduce the number of faces of a mesh, or of a whole scene.
 ///
@@ -267,51 +269,6 @@ impl Args {
         Ok(job)
     }
 
-    /// The summary for people, on standard error.
-    fn tell(&self, file: &str, s: &Summary, n: &Triangles, t: &Seconds) {
-        if self.method == MethodName::Nsa {
-            for l in &s.levels {
-                common::note(&format!(
-                    "pass {}: {} faces, {:.3} s, {} collapses tried, {} refused",
-                    l.pass,
-                    thousands(l.faces),
-                    l.seconds,
-                    thousands(l.tried as usize),
-                    thousands(l.refused.total() as usize)
-                ));
-            }
-        }
-        let percent = 100.0 * s.faces_out as f64 / s.faces_in.max(1) as f64;
-        let relative = match s.diagonal > 0.0 {
-            true => format!(" ({} % of the diagonal)", short(100.0 * s.estimate / s.diagonal)),
-            false => String::new(),
-        };
-        common::note(&format!(
-            "{file}: {} -> {} faces ({percent:.1} %), {} vertices{}; {}, {:.3} s (read {:.3}, build {:.3}, simplify {:.3}, \
-             write {:.3}{}); estimated error {}{relative}; stopped: {}",
-            thousands(s.faces_in),
-            thousands(s.faces_out),
-            thousands(s.vertices_out),
-            n.instances(),
-            self.method_name(),
-            t.total,
-            t.read,
-            t.build,
-            t.simplify,
-            t.write,
-            if t.draw > 0.0 { format!(", draw {:.3}", t.draw) } else { String::new() },
-            short(s.estimate),
-            match s.stop {
-                Stop::Target => "target reached",
-                Stop::Error => "error bound reached",
-                Stop::Passes => "passes done",
-                Stop::Cancelled => "interrupted",
-                _ if self.method == MethodName::Cluster => "a coarser grid would leave nothing",
-                _ => "no legal collapse left",
-            }
-        ));
-    }
-
     fn method_name(&self) -> &'static str {
         match self.method {
             MethodName::Nsa => "nsa",
@@ -320,101 +277,9 @@ impl Args {
         }
     }
 
-    /// What most likely stands in the way of the target, and what helps.
-    fn advice(&self, s: &Summary, target: usize) -> String {
-        if self.method == MethodName::Cluster {
-            return match self.locks() {
-                _ if target == 0 => "A mesh is never left empty: ask for 1 or more".into(),
-                true => "Locked vertices are not merged: lock less, or try --method quadric".into(),
-                false => "Try --method quadric, which meets a target by single faces".into(),
-            };
-        }
-        if s.least_triangles > target {
-            return format!(
-                "A closed surface has at least 4 faces a component, with handles more, an open one 1: here {} together. Ask for \
-                 more, or try --weld or --prune, or --method cluster, which does not keep topology",
-                thousands(s.least_triangles)
-            );
-        }
-        let last = s.levels.last().map(|l| l.refused).unwrap_or_default();
-        let reasons = [
-            (last.normal, "normals would turn too far: try a larger --epsilon"),
-            (
-                last.link,
-                "topology would change: try --weld or --prune, or --method cluster, which does not keep it",
-            ),
-            (last.border, "borders, seams or material borders would change: try --weld, or --method quadric"),
-            (last.flip, "faces would flip or degenerate: try --placement endpoint or another --method"),
-            (last.valence, "vertices would get too many edges: try --method cluster"),
-            (last.locked, "vertices are locked: lock less"),
-        ];
-        match reasons.iter().max_by_key(|r| r.0).filter(|r| r.0 > 0) {
-            Some((_, advice)) => format!("Mostly {advice}"),
-            // A batch need not look at what is locked at all.
-            None if self.locks() => "What is left is locked: lock less".into(),
-            None => "Try --weld, --prune or --method cluster".into(),
-        }
-    }
-
-    /// What to say where a bound on the cells of a grid kept all vertices apart.
-    fn nothing_merged(&self, s: &Summary) -> Option<String> {
-        let nothing = self.method == MethodName::Cluster
-            && self.max_error.is_some()
-            && s.stop == Stop::Error
-            && s.triangles_in > 0
-            && s.triangles_out == s.triangles_in;
-        nothing.then(|| {
-            "nothing was merged: for --method cluster --max-error is the diagonal of a cell, and no two vertices of a face lie in one; \
-             allow more, or try --method quadric"
-                .into()
-        })
-    }
-
     fn locks(&self) -> bool {
         let named = !self.lock_material.is_empty() || !self.lock_group.is_empty();
         named || self.lock_border || self.lock_property.is_some()
-    }
-
-    fn report(&self, s: &Summary, triangles: Triangles, seconds: Seconds, warnings: Vec<String>) -> Report {
-        Report {
-            command: "simplify",
-            method: self.method_name(),
-            faces_in: s.faces_in,
-            faces_out: s.faces_out,
-            vertices_out: s.vertices_out,
-            triangles,
-            seconds,
-            stop: match s.stop {
-                Stop::Target => "target",
-                Stop::Error => "error",
-                Stop::Passes => "passes",
-                Stop::Cancelled => "cancelled",
-                _ => "no_legal_collapse",
-            },
-            estimate: s.estimate,
-            measured: None,
-            levels: s
-                .levels
-                .iter()
-                .map(|l| LevelReport {
-                    pass: l.pass,
-                    faces: l.faces,
-                    seconds: l.seconds,
-                    tried: l.tried,
-                    refused: RefusedReport {
-                        link: l.refused.link,
-                        normal: l.refused.normal,
-                        border: l.refused.border,
-                        flip: l.refused.flip,
-                        valence: l.refused.valence,
-                        locked: l.refused.locked,
-                    },
-                })
-                .collect(),
-            aif_bytes: s.aif_bytes,
-            peak_bytes: files::peak_bytes(),
-            warnings,
-        }
     }
 }
 
@@ -426,78 +291,4 @@ fn failure(file: &str, e: JobError) -> Failure {
         | JobError::SeveralMeshes { .. } => Failure::Usage(format!("{file}: {e}")),
         e => Failure::Input(format!("{file}: {e}")),
     }
-}
-
-/// The schema of `--json`; docs/json.md says what each field means.
-#[derive(Serialize)]
-struct Report {
-    command: &'static str,
-    method: &'static str,
-    faces_in: usize,
-    faces_out: usize,
-    vertices_out: usize,
-    triangles: Triangles,
-    seconds: Seconds,
-    stop: &'static str,
-    estimate: f64,
-    measured: Option<()>,
-    levels: Vec<LevelReport>,
-    aif_bytes: usize,
-    peak_bytes: Option<u64>,
-    warnings: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct Seconds {
-    read: f64,
-    build: f64,
-    simplify: f64,
-    write: f64,
-    draw: f64,
-    total: f64,
-}
-
-/// Triangles of the unique meshes, which targets count, and of all instances, which are drawn.
-#[derive(Serialize)]
-struct Triangles {
-    input: usize,
-    output: usize,
-    instanced_input: usize,
-    instanced_output: usize,
-    #[serde(skip)]
-    meshes: usize,
-}
-
-impl Triangles {
-    /// For people, where instances make a difference.
-    fn instances(&self) -> String {
-        if (self.instanced_input, self.instanced_output) == (self.input, self.output) {
-            return String::new();
-        }
-        format!(
-            " in {}, each counted once (all instances: {} -> {} triangles)",
-            count(self.meshes, "mesh"),
-            thousands(self.instanced_input),
-            thousands(self.instanced_output)
-        )
-    }
-}
-
-#[derive(Serialize)]
-struct LevelReport {
-    pass: usize,
-    faces: usize,
-    seconds: f64,
-    tried: u64,
-    refused: RefusedReport,
-}
-
-#[derive(Serialize)]
-struct RefusedReport {
-    link: u64,
-    normal: u64,
-    border: u64,
-    flip: u64,
-    valence: u64,
-    locked: u64,
 }
