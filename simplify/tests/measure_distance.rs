@@ -4,34 +4,19 @@ mod common;
 
 use common::distance::closest;
 use common::sample;
+use common::soups::{Soup, soup, surface};
 use glam::DVec3;
 use progmesh_simplify::measure::*;
 use progmesh_simplify::{Control, Quiet};
 use proptest::prelude::*;
-
-type Soup = (Vec<[f64; 3]>, Vec<[u32; 3]>);
-
-/// A soup with what goes wrong: repeated corners, repeated triangles, points on a line, on a coarse grid.
-fn soup(largest: usize) -> impl Strategy<Value = Soup> {
-    (3usize..20).prop_flat_map(move |n| {
-        let points =
-            prop::collection::vec(prop::array::uniform3((-4i32..5).prop_map(|x| x as f64 * 0.25)), n);
-        let triangles = prop::collection::vec(prop::array::uniform3(0..n as u32), 1..largest);
-        (points, triangles)
-    })
-}
 
 fn brute(p: DVec3, (points, triangles): &Soup) -> f64 {
     let at = |v: u32| DVec3::from_array(points[v as usize]);
     triangles.iter().map(|t| closest(p, &t.map(at)).distance(p)).fold(f64::INFINITY, f64::min)
 }
 
-fn surface(s: &Soup) -> Surface {
-    Surface::new(&s.0[..], &s.1).unwrap()
-}
-
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn the_closest_point_is_as_near_as_any(s in soup(60), asked in prop::collection::vec(prop::array::uniform3(-2.0..2.0f64), 20), far in -9..9i32) {

@@ -180,7 +180,7 @@ pub fn vertex_distances(a: &Surface, b: &Surface, control: &dyn Control) -> Resu
 }
 
 /// Calls `visit` for all vertices of `a` with what of `b` is closest; what became of each chunk, in order.
-fn over_vertices<T: Default + Send>(
+pub(super) fn over_vertices<T: Default + Send>(
     a: &Surface,
     b: &Surface,
     progress: &Progress<'_>,

@@ -1,12 +1,13 @@
 //! Measuring: how far two surfaces are from each other.
 //!
-//! [`Surface`] holds triangles of any kind and answers [closest-point queries](Surface::query). [`distance`] compares two of them after
+//! [`Surface`] holds triangles of any kind and answers [closest-point queries](Surface::query). [`distance()`] compares two of them after
 //! Metro (Cignoni, Rocchini & Scopigno 1998): by samples, in both directions; [`vertex_distances`] gives the distance of every vertex,
-//! for heat maps.
+//! for heat maps. [`certify`] proves an interval of the Hausdorff distance, [`within`] decides whether it is below a bound.
 //!
 //! Guaranteed: distances to triangles are computed in f64 about the surface's own centre, so a mesh far from the origin measures as
 //! exactly as its coordinates allow; degenerate triangles count as the segments or points they are; results do not depend on the number of
-//! threads. Not guaranteed: that the largest *sampled* distance is the largest there is; it is a lower bound.
+//! threads; the intervals of [`certify`] hold, with all rounding accounted for. Not guaranteed: that the largest *sampled* distance is the
+//! largest there is; it is a lower bound.
 //!
 //! ```
 //! use progmesh_simplify::{Quiet, measure::{DistanceOptions, Surface, distance}};
@@ -23,14 +24,17 @@
 //! ```
 
 mod bvh;
+mod certify;
 mod distance;
 mod error;
+mod pieces;
 mod progress;
 mod query;
 mod sample;
 mod surface;
 mod triangle;
 
+pub use certify::{Certified, CertifyOptions, Interval, Within, certify, within};
 pub use distance::{
     DistanceOptions, Distances, Farthest, OneSided, Quantiles, Summary, distance, vertex_distances,
 };

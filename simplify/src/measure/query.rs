@@ -61,6 +61,25 @@ impl<'a> Query<'a> {
         self.nearest(self.surface.frame.local(p)).foot.d2.sqrt() / self.surface.frame.scale
     }
 
+    pub(super) fn surface(&self) -> &'a Surface {
+        self.surface
+    }
+
+    /// The closest point to a local one, starting from the nearer of two triangles of the hierarchy.
+    #[inline]
+    pub(super) fn nearest_from(&mut self, p: DVec3, [t, u]: [u32; 2]) -> Best {
+        let foot = |t: u32| triangle::closest(self.surface.corners(t as usize), p);
+        let mut best = Best { triangle: t, foot: foot(t) };
+        if u != t {
+            let other = foot(u);
+            if other.d2 < best.foot.d2 {
+                best = Best { triangle: u, foot: other };
+            }
+        }
+        self.surface.search(p, &mut best);
+        best
+    }
+
     /// The closest point to a local one.
     #[inline]
     pub(super) fn nearest(&mut self, p: DVec3) -> Best {
@@ -70,11 +89,7 @@ impl<'a> Query<'a> {
         }
         let mut best =
             Best { triangle: self.last, foot: triangle::closest(s.corners(self.last as usize), p) };
-        if p.abs().max_element() < FAR {
-            s.search_near(p, &mut best);
-        } else {
-            s.search_far(p, &mut best);
-        }
+        s.search(p, &mut best);
         self.last = best.triangle;
         best
     }
@@ -109,46 +124,93 @@ impl Surface {
         }
     }
 
-    #[inline]
-    fn try_triangle(&self, t: u32, p: DVec3, best: &mut Best) -> bool {
-        let foot = triangle::closest(self.corners(t as usize), p);
-        let better = foot.d2 < best.foot.d2;
-        if better {
-            *best = Best { triangle: t, foot };
+    /// Lowers `best` to the nearest triangle. Boxes are tested in f32, conservatively; triangles in f64.
+    fn search(&self, p: DVec3, best: &mut Best) {
+        let d2 = best.foot.d2;
+        let visit = |t: u32| {
+            let foot = triangle::closest(self.corners(t as usize), p);
+            if foot.d2 < best.foot.d2 {
+                *best = Best { triangle: t, foot };
+            }
+            best.foot.d2
+        };
+        if near(p) {
+            let around = Around::new(p);
+            self.descend(d2, |n, limit| keys(around.squared(n), limit), visit);
+        } else {
+            self.descend_far(p, d2, visit);
         }
-        better
     }
 
-    /// Lowers `best` to the nearest triangle. Boxes are tested in f32, conservatively; triangles in f64.
-    fn search_near(&self, p: DVec3, best: &mut Best) {
-        let (lo, hi) = (p.to_array().map(down).map(Vec4::splat), p.to_array().map(up).map(Vec4::splat));
+    /// A proven bound below the distance of `p`, given the distance found; local. As good as the distance, but for rounding.
+    pub(super) fn at_least(&self, p: DVec3, found: f64) -> f64 {
+        let mut least = found;
+        let limit = found * found;
+        let visit = |t: u32| {
+            let corners = self.corners(t as usize);
+            let Foot { v, w, .. } = triangle::closest(corners, p);
+            let on = corners[0] + (corners[1] - corners[0]) * v + (corners[2] - corners[0]) * w;
+            least = least.min(triangle::at_least(corners, p, p - on));
+            limit
+        };
+        if near(p) {
+            let around = Around::new(p);
+            self.descend(limit, |n, limit| keys(around.squared(n), limit), visit);
+        } else {
+            self.descend_far(p, limit, visit);
+        }
+        least
+    }
+
+    /// The triangle whose greatest squared distance from the three points is least, if there is one below `d2`; and that distance. For
+    /// points that are near.
+    pub(super) fn least_of_greatest(&self, points: &[DVec3; 3], d2: f64) -> Option<(u32, f64)> {
+        if !points.iter().all(|&p| near(p)) {
+            return None;
+        }
+        let around = points.map(Around::new);
+        let mut found = None;
+        let mut least = d2;
+        let keys = |n: &Node, limit| {
+            let [x, y, z] = [0, 1, 2].map(|k| around[k].squared(n));
+            keys(x.max(y).max(z), limit)
+        };
+        self.descend(d2, keys, |t| {
+            let greatest = greatest(self.corners(t as usize), points, least);
+            if greatest < least {
+                (least, found) = (greatest, Some(t));
+            }
+            least
+        });
+        found.map(|t| (t, least))
+    }
+
+    /// Visits the triangles below all nodes that `keys` (squared distances of the children) leaves below the limit, near ones first; `visit`
+    /// returns the new limit.
+    #[inline]
+    fn descend(&self, d2: f64, keys: impl Fn(&Node, f32) -> [u32; 4], mut visit: impl FnMut(u32) -> f64) {
         let bvh = &self.bvh;
-        let mut limit = ceiling(best.foot.d2);
+        let mut limit = ceiling(d2);
         let mut stack = [Waiting::default(); STACK];
         let mut waiting = 0;
         let mut level = bvh.base.len() - 1;
         let mut node = bvh.base[level];
         loop {
-            let mut keys = keys(&bvh.nodes[node as usize], &lo, &hi, limit);
+            let mut keys = keys(&bvh.nodes[node as usize], limit);
             let first = 4 * (node - bvh.base[level]);
             sort(&mut keys);
             if level == 0 {
                 for key in keys {
-                    if f32::from_bits(key & !3) > limit || key == u32::MAX {
+                    if key == NOT || f32::from_bits(key & !3) > limit {
                         break;
                     }
-                    if self.try_triangle(first + (key & 3), p, best) {
-                        limit = ceiling(best.foot.d2);
-                    }
+                    limit = ceiling(visit(first + (key & 3)));
                 }
-            } else if keys[0] != u32::MAX {
+            } else if keys[0] != NOT {
                 let below = bvh.base[level - 1] + first;
-                for &key in keys[1..].iter().rev().filter(|&&k| k != u32::MAX) {
-                    stack[waiting] = Waiting {
-                        d2: f32::from_bits(key & !3),
-                        level: level as u32 - 1,
-                        node: below + (key & 3),
-                    };
+                for &key in keys[1..].iter().rev().filter(|&&k| k != NOT) {
+                    let d2 = f32::from_bits(key & !3);
+                    stack[waiting] = Waiting { d2, level: level as u32 - 1, node: below + (key & 3) };
                     waiting += 1;
                 }
                 (level, node) = (level - 1, below + (keys[0] & 3));
@@ -170,12 +232,13 @@ impl Surface {
 
     /// The same for points far out, wholly in f64.
     #[cold]
-    fn search_far(&self, p: DVec3, best: &mut Best) {
+    fn descend_far(&self, p: DVec3, d2: f64, mut visit: impl FnMut(u32) -> f64) {
         let bvh = &self.bvh;
         let root = bvh.base.len() - 1;
+        let mut limit = d2;
         let mut stack = vec![(0.0, root, bvh.base[root])];
         while let Some((d2, level, node)) = stack.pop() {
-            if d2 > best.foot.d2 {
+            if d2 > limit {
                 continue;
             }
             let n = &bvh.nodes[node as usize];
@@ -193,12 +256,12 @@ impl Surface {
             // Farthest first, so that the nearest lies on top; for triangles the other way round.
             if level > 0 {
                 let below = bvh.base[level - 1] + first;
-                let near = found.iter().filter(|f| f.0 <= best.foot.d2 && f.0 < f64::INFINITY);
+                let near = found.iter().filter(|f| f.0 <= limit && f.0 < f64::INFINITY);
                 stack.extend(near.map(|&(d2, lane)| (d2, level - 1, below + lane)));
             } else {
                 for &(d2, lane) in found.iter().rev() {
-                    if d2 <= best.foot.d2 && d2 < f64::INFINITY {
-                        self.try_triangle(first + lane, p, best);
+                    if d2 <= limit && d2 < f64::INFINITY {
+                        limit = visit(first + lane);
                     }
                 }
             }
@@ -206,19 +269,56 @@ impl Surface {
     }
 }
 
-/// Squared distances of the four boxes from the point between `lo` and `hi`, as ordered bits with the lane in the lowest two; `u32::MAX`
-/// for those beyond `limit`.
+/// The greatest squared distance of the points from a triangle; or anything above `enough` once that is passed.
 #[inline]
-fn keys(n: &Node, lo: &[Vec4; 3], hi: &[Vec4; 3], limit: f32) -> [u32; 4] {
-    let away = |k: usize| (n.lo[k] - hi[k]).max(lo[k] - n.hi[k]).max(Vec4::ZERO);
-    let (x, y, z) = (away(0), away(1), away(2));
-    let d2 = x * x + y * y + z * z;
+pub(super) fn greatest(t: [DVec3; 3], points: &[DVec3; 3], enough: f64) -> f64 {
+    let mut greatest = 0f64;
+    for &p in points {
+        greatest = greatest.max(triangle::closest(t, p).d2);
+        if greatest > enough {
+            break;
+        }
+    }
+    greatest
+}
+
+fn near(p: DVec3) -> bool {
+    p.abs().max_element() < FAR
+}
+
+/// A point between two in f32.
+struct Around {
+    lo: [Vec4; 3],
+    hi: [Vec4; 3],
+}
+
+impl Around {
+    #[inline]
+    fn new(p: DVec3) -> Self {
+        Around { lo: p.to_array().map(down).map(Vec4::splat), hi: p.to_array().map(up).map(Vec4::splat) }
+    }
+
+    /// Squared distances of the four boxes; never above the true ones by more than rounding. Infinite for missing children.
+    #[inline]
+    fn squared(&self, n: &Node) -> Vec4 {
+        let away = |k: usize| (n.lo[k] - self.hi[k]).max(self.lo[k] - n.hi[k]).max(Vec4::ZERO);
+        let (x, y, z) = (away(0), away(1), away(2));
+        x * x + y * y + z * z
+    }
+}
+
+/// The key of a child that is out of the question.
+const NOT: u32 = u32::MAX;
+
+/// Squared distances as ordered bits with the lane in the lowest two; [`NOT`] for those beyond `limit`.
+#[inline]
+fn keys(d2: Vec4, limit: f32) -> [u32; 4] {
     let d2 = d2.to_array();
     std::array::from_fn(|lane| {
         if d2[lane] <= limit && d2[lane] < f32::INFINITY {
             d2[lane].to_bits() & !3 | lane as u32
         } else {
-            u32::MAX
+            NOT
         }
     })
 }

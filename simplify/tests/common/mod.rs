@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub(crate) mod distance;
+pub(crate) mod soups;
 
 use progmesh_aif::*;
 use progmesh_meshes::{GenerateOptions, Sample, generate};
