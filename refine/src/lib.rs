@@ -8,8 +8,8 @@
 //! other step what it was there before, however it is reached; [`progmesh_aif::Mesh::check`] holds throughout; moving by
 //! one collapse takes time in proportion to the valence, and memory is one flat record of about 100 bytes a collapse.
 //!
-//! There now: the multiresolution scheme in memory. Not there yet: progressive-mesh files and streams, geomorphs, view-dependent
-//! refinement; they will build on the same records.
+//! There now: the multiresolution scheme in memory, [progressive meshes](progressive) and [geomorphs](geomorph). Not there yet:
+//! progressive-mesh files and streams, view-dependent refinement; they will build on the same records.
 //!
 //! ```
 //! use progmesh_refine::{History, simplify::{Options, Quiet}};
@@ -22,9 +22,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod geomorph;
 pub mod progressive;
 mod record;
 
+pub use geomorph::{Geomorph, GeomorphError};
 pub use progmesh_aif as aif;
 pub use progmesh_simplify as simplify;
 pub use progressive::{Cursor, ProgressiveMesh};

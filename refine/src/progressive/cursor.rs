@@ -72,6 +72,8 @@ pub struct Cursor<P: Deref<Target = ProgressiveMesh>> {
     undo_positions: Positions,
     wedges: Option<WedgeState>,
     touched: Option<Touched>,
+    /// The wedge of every wedge at the split count where this began.
+    descent: Option<Vec<u32>>,
 }
 
 /// What a [`Patch`] needs, while one is made.
@@ -120,6 +122,7 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
             wedges,
             position: 0,
             touched: None,
+            descent: None,
             source,
         })
     }
@@ -260,6 +263,16 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
         result
     }
 
+    /// As [`Cursor::seek`] to a finer state; returns for every wedge there the wedge it comes from here.
+    ///
+    /// Errors: as [`Cursor::seek`].
+    pub(crate) fn seek_with_descent(&mut self, position: usize) -> Result<Vec<u32>, Damage> {
+        self.descent = Some((0..self.wedge_count() as u32).collect());
+        let result = self.seek(position.max(self.position));
+        let descent = self.descent.take().unwrap_or_default();
+        result.map(|()| descent)
+    }
+
     /// Applies the next split; false at full detail. O(valence).
     ///
     /// Errors: damage; nothing has changed then.
@@ -315,6 +328,12 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
                 moved.for_each(|p| state.vertex[p.1 as usize] = vu);
             }
             state.apply(streams, vu, new, changed);
+        }
+        if let Some(from) = &mut self.descent {
+            let own = [(x[0], w), (x[1], w + 1)];
+            let pairs = if code.kind() == SplitKind::Explicit { &explicit.pairs[..] } else { &own[..new] };
+            let fresh = pairs.iter().filter(|p| p.1 >= w);
+            fresh.for_each(|p| from.push(from[p.0 as usize]));
         }
         if let Some(t) = &mut self.touched {
             t.wedges.extend_from_slice(changed);

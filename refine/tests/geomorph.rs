@@ -1,0 +1,192 @@
+//! Geomorphs: both ends are the two meshes bit for bit, and nothing in between is out of order.
+
+use progmesh_meshes::{GenerateOptions, generate};
+use progmesh_refine::aif::*;
+use progmesh_refine::progressive::build;
+use progmesh_refine::simplify::{Method, Options, Quiet};
+use progmesh_refine::{Geomorph, GeomorphError, ProgressiveMesh};
+use proptest::prelude::*;
+
+/// A sample with normals, uvs and everything else a wedge can have, so that each kind of channel is met. Materials make more seams.
+fn mesh(name: &str, faces: usize, seed: u64) -> Mesh {
+    let s = generate(name, &GenerateOptions::default().with_faces(faces).with_seed(seed)).unwrap();
+    let mut input = MeshInput {
+        positions: Positions::from_f64(s.positions.clone()),
+        face_sizes: s.face_sizes.clone(),
+        corners: s.corners.clone(),
+        wires: s.wires.clone(),
+        face_material: s.face_material.clone(),
+        ..Default::default()
+    };
+    let channel = Channel::new;
+    let mut w = Wedges::new(vec![
+        channel(Semantic::Normal, 3),
+        channel(Semantic::TexCoord(0), 2),
+        channel(Semantic::Joints(0), 4),
+        channel(Semantic::Weights(0), 4),
+        channel(Semantic::Custom("heat".into()), 1),
+    ])
+    .unwrap();
+    let mut known = std::collections::HashMap::new();
+    for c in 0..s.corners.len() {
+        let v = s.corners[c];
+        let normal = s.normals.as_ref().map(|n| (n.corner[c], n.values[n.corner[c] as usize]));
+        let uv = s.uvs.as_ref().map(|u| (u.corner[c], u.values[u.corner[c] as usize]));
+        let key = (v, normal.map(|n| n.0), uv.map(|u| u.0));
+        let id = *known.entry(key).or_insert_with(|| {
+            let mut row = normal.map_or([0.0, 0.0, 1.0], |n| n.1).to_vec();
+            row.extend(uv.map_or([0.5; 2], |u| u.1));
+            row.extend([(v % 3) as f32, 1.0, 2.0, 3.0, 0.25, 0.75, 0.0, 0.0, v as f32]);
+            // Some have no heat.
+            w.push(&row, if v % 5 == 0 { 0b01111 } else { 0b11111 })
+        });
+        w.corner.push(id);
+    }
+    input.wedges = Some(w);
+    Mesh::build(input, &BuildOptions::default()).unwrap().0
+}
+
+type Corner = ([u64; 3], Option<(u64, Vec<u32>)>);
+
+/// What every face shows: position and attributes of its corners, as bits, with material and group.
+fn faces(m: &MeshInput) -> Vec<([Corner; 3], Option<u32>)> {
+    let corner = |c: usize| {
+        let at = m.positions.get(m.corners[c] as usize).to_array().map(f64::to_bits);
+        let wedge = m
+            .wedges
+            .as_ref()
+            .map(|w| (w, w.corner[c]))
+            .filter(|w| w.1 != NONE)
+            .map(|(w, id)| (w.present(id), w.row(id).iter().map(|x| x.to_bits()).collect()));
+        (at, wedge)
+    };
+    (0..m.corners.len() / 3)
+        .map(|f| ([0, 1, 2].map(|k| corner(3 * f + k)), m.face_material.get(f).copied()))
+        .collect()
+}
+
+/// Everything that is guaranteed of a geomorph between two states.
+fn check(pm: &ProgressiveMesh, one: usize, other: usize) {
+    let (low, high) = (one.min(other), one.max(other));
+    let (mut coarse, mut fine) = (pm.cursor().unwrap(), pm.cursor().unwrap());
+    coarse.seek(low).unwrap();
+    fine.seek(high).unwrap();
+    let g = Geomorph::between(&fine, &coarse).unwrap();
+    let end = g.at(1.0);
+    let want = fine.to_input();
+    assert_eq!(faces(&end), faces(&want));
+    assert_eq!((end.corners, end.wires, end.face_material), (want.corners, want.wires, want.face_material));
+
+    let begin = g.at(0.0);
+    let ancestor = g.vertex_ancestors();
+    let proper = |f: usize| {
+        let [a, b, c] = [0, 1, 2].map(|k| ancestor[begin.corners[3 * f + k] as usize]);
+        a != b && b != c && c != a
+    };
+    let kept: Vec<usize> = (0..begin.corners.len() / 3).filter(|&f| proper(f)).collect();
+    assert_eq!(kept, (0..g.coarse_faces()).collect::<Vec<_>>());
+    let have = faces(&begin);
+    assert_eq!(kept.iter().map(|&f| have[f].clone()).collect::<Vec<_>>(), faces(&coarse.to_input()));
+
+    // Between: within the box of both ends, coordinate by coordinate; normals of unit length.
+    for a in [0.25, 0.5, 0.9] {
+        let m = g.at(a);
+        let (start, stop) = g.positions();
+        for v in 0..m.positions.len() {
+            let (p, q, x) = (start.get(v), stop.get(v), m.positions.get(v));
+            assert!(x.cmpge(p.min(q)).all() && x.cmple(p.max(q)).all(), "{p} {x} {q}");
+        }
+        let w = m.wedges.unwrap();
+        for i in 0..w.len() as u32 {
+            let n: f32 = w.get(i, 0).unwrap().iter().map(|x| x * x).sum();
+            assert!((n - 1.0).abs() < 1e-3, "{n}");
+            let joints = w.get(i, 2).unwrap();
+            assert!(joints.iter().all(|j| j.fract() == 0.0 && (0.0..4.0).contains(j)), "{joints:?}");
+            let weights: f32 = w.get(i, 3).unwrap().iter().sum();
+            assert!((weights - 1.0).abs() < 1e-5);
+        }
+    }
+}
+
+const NAMES: [&str; 8] =
+    ["sphere", "torus", "scan", "terrain", "polygons", "quad-sphere", "cad", "nonmanifold"];
+
+#[test]
+fn the_ends_are_the_meshes_by_every_method_on_every_sample() {
+    for name in NAMES {
+        let mesh = mesh(name, 1500, 3);
+        for method in [Method::Quadric, Method::Nsa] {
+            let mut o = Options::default();
+            o.method = method;
+            let pm = build(mesh.clone(), &o, &Quiet).unwrap().mesh;
+            let n = pm.splits.len();
+            for (a, b) in [(0, n), (n / 4, n / 2), (n, n - 1), (n / 3, n / 3)] {
+                check(&pm, a, b);
+            }
+        }
+    }
+}
+
+#[test]
+fn both_sides_of_a_seam_come_from_the_seam() {
+    let pm = build(mesh("quad-sphere", 2000, 1), &Options::default(), &Quiet).unwrap().mesh;
+    let (mut coarse, mut fine) = (pm.cursor().unwrap(), pm.cursor().unwrap());
+    coarse.seek(pm.splits.len() / 3).unwrap();
+    fine.seek(usize::MAX).unwrap();
+    let g = Geomorph::between(&coarse, &fine).unwrap();
+    let mut on_seam = 0;
+    for (w, &from) in (0u32..).zip(g.wedge_ancestors()) {
+        assert_ne!(from, NONE);
+        // A wedge's ancestor is a wedge of its vertex's ancestor.
+        let v = g.vertex_ancestors()[fine.wedge_vertex(w) as usize];
+        assert_eq!(coarse.wedge_vertex(from), v);
+        on_seam += (w > 0
+            && fine.wedge_vertex(w) == fine.wedge_vertex(w - 1)
+            && g.wedge_ancestors()[w as usize - 1] != from) as usize;
+    }
+    assert!(on_seam > 10, "{on_seam}");
+}
+
+#[test]
+fn a_vertex_in_the_middle_is_half_way() {
+    let pm = build(mesh("scan", 800, 2), &Options::default(), &Quiet).unwrap().mesh;
+    let g = Geomorph::new(&pm, 0, pm.splits.len()).unwrap();
+    let (p, q) = g.positions();
+    let half = g.positions_at(0.5);
+    for v in 0..half.len() {
+        assert!((half.get(v) - (p.get(v) + q.get(v)) / 2.0).length() <= 1e-6 * q.get(v).length().max(1.0));
+    }
+}
+
+#[test]
+fn states_of_different_meshes_are_refused() {
+    let pm = |seed| build(mesh("scan", 300, seed), &Options::default(), &Quiet).unwrap().mesh;
+    let (a, b, c) = (pm(1), pm(2), pm(1));
+    let morph = |x: &ProgressiveMesh, y: &ProgressiveMesh| {
+        Geomorph::between(&x.cursor().unwrap(), &y.cursor().unwrap()).map(|_| ())
+    };
+    assert_eq!(morph(&a, &b), Err(GeomorphError::TwoMeshes));
+    assert_eq!(morph(&a, &c), Ok(()));
+    let mut damaged = a.clone();
+    damaged.splits.vertex[5] = u32::MAX;
+    assert!(matches!(Geomorph::new(&damaged, 0, 100), Err(GeomorphError::Damage(_))));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn any_two_states_of_any_mesh(
+        name in prop::sample::select(&NAMES[..]),
+        seed in 0u64..1000,
+        from in 0.0..1.0f64,
+        to in 0.0..1.0f64,
+        nsa: bool,
+    ) {
+        let mut o = Options::default();
+        o.method = if nsa { Method::Nsa } else { Method::Quadric };
+        let pm = build(mesh(name, 400, seed), &o, &Quiet).unwrap().mesh;
+        let at = |x: f64| (x * (pm.splits.len() + 1) as f64) as usize;
+        check(&pm, at(from), at(to));
+    }
+}
