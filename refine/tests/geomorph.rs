@@ -38,7 +38,7 @@ fn mesh(name: &str, faces: usize, seed: u64) -> Mesh {
             row.extend(uv.map_or([0.5; 2], |u| u.1));
             row.extend([(v % 3) as f32, 1.0, 2.0, 3.0, 0.25, 0.75, 0.0, 0.0, v as f32]);
             // Some have no heat.
-            w.push(&row, if v % 5 == 0 { 0b01111 } else { 0b11111 })
+            w.push(&row, if v.is_multiple_of(5) { 0b01111 } else { 0b11111 })
         });
         w.corner.push(id);
     }
