@@ -153,3 +153,17 @@ fn all_errors_begin_alike() {
         assert_eq!(errors, 1, "{arguments}: {}", run.stderr);
     }
 }
+
+#[test]
+fn nobody_is_told_to_unlock_what_nobody_locked() {
+    let p = Place::new();
+    // Fins on one edge: all their vertices but the tips are where sheets meet.
+    let fin = |k: usize| format!("v {} {} 0.5\n", (k as f64).cos(), (k as f64).sin());
+    let fins: String = (0..6).map(fin).collect();
+    let faces: String = (3..9).map(|v| format!("f 1 2 {v}\n")).collect();
+    p.write("fins.obj", format!("v 0 0 0\nv 0 0 1\n{fins}{faces}"));
+    let run = p.run("simplify fins.obj out.obj --triangles 2");
+    assert!(run.code == 1 && !run.stderr.contains("lock"), "{}", run.stderr);
+    let run = p.run("simplify fins.obj out.obj --triangles 2 --lock-border");
+    assert!(run.code == 1, "{}", run.stderr);
+}

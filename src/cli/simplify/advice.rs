@@ -49,7 +49,15 @@ impl Args {
             ),
             (last.flip, "faces would flip or degenerate: try --placement endpoint or another --method"),
             (last.valence, "vertices would get too many edges: try --method cluster"),
-            (last.locked, "vertices are locked: lock less"),
+            (
+                last.locked,
+                match self.locks() {
+                    true => "vertices are locked: lock less",
+                    false => {
+                        "vertices stay where borders, seams or pieces of the surface meet: try --weld, or --method cluster"
+                    }
+                },
+            ),
         ];
         match reasons.iter().max_by_key(|r| r.0).filter(|r| r.0 > 0) {
             Some((_, advice)) => format!("Mostly {advice}"),
