@@ -30,6 +30,15 @@ impl Default for DistanceOptions {
     }
 }
 
+impl DistanceOptions {
+    pub(super) fn check(&self) -> Result<(), MeasureError> {
+        if self.samples == 0 {
+            return Err(MeasureError::Range { option: "samples", value: 0.0, range: "at least 1" });
+        }
+        Ok(())
+    }
+}
+
 /// Quantiles of the distance: this share of the area is at most so far away.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Quantiles {
@@ -156,9 +165,7 @@ pub fn distance(
     options: &DistanceOptions,
     control: &dyn Control,
 ) -> Result<Distances, MeasureError> {
-    if options.samples == 0 {
-        return Err(MeasureError::Range { option: "samples", value: 0.0, range: "at least 1" });
-    }
+    options.check()?;
     parallel::with_threads(options.threads, || {
         let progress = Progress::new(control, 2 * options.samples + a.points.len() + b.points.len());
         let a_to_b = one_sided(a, b, options, &progress)?;
@@ -321,7 +328,7 @@ fn one_sided(
 }
 
 /// By nearest rank. Leaves `d` in another order. O(n).
-fn quantiles(d: &mut [f64]) -> Quantiles {
+pub(super) fn quantiles(d: &mut [f64]) -> Quantiles {
     let n = d.len();
     let mut rest = d;
     // From above, each below what the last one left.

@@ -3,6 +3,8 @@
 //! [`Surface`] holds triangles of any kind and answers [closest-point queries](Surface::query). [`distance()`] compares two of them after
 //! Metro (Cignoni, Rocchini & Scopigno 1998): by samples, in both directions; [`vertex_distances`] gives the distance of every vertex,
 //! for heat maps. [`certify`] proves an interval of the Hausdorff distance, [`within`] decides whether it is below a bound.
+//! [`deviations`] compares normals, texture coordinates and colours at closest points; [`turned_triangles`], [`self_intersections`],
+//! [`triangle_quality`] and [`TopologySummary`] look at what else may have gone wrong.
 //!
 //! Guaranteed: distances to triangles are computed in f64 about the surface's own centre, so a mesh far from the origin measures as
 //! exactly as its coordinates allow; degenerate triangles count as the segments or points they are; results do not depend on the number of
@@ -25,19 +27,25 @@
 
 mod bvh;
 mod certify;
+mod deviation;
 mod distance;
 mod error;
+mod intersections;
 mod pieces;
 mod progress;
 mod query;
 mod sample;
+mod shape;
 mod surface;
 mod triangle;
 
 pub use certify::{Certified, CertifyOptions, Interval, Within, certify, within};
+pub use deviation::{CornerValues, Deviation, Deviations, TwoSided, deviations, turned_triangles};
 pub use distance::{
     DistanceOptions, Distances, Farthest, OneSided, Quantiles, Summary, distance, vertex_distances,
 };
 pub use error::MeasureError;
+pub use intersections::{SelfIntersections, self_intersections};
 pub use query::{ClosestPoint, Query};
+pub use shape::{TopologySummary, TriangleQuality, triangle_quality};
 pub use surface::{Points, Surface};

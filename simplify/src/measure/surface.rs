@@ -219,6 +219,13 @@ impl Surface {
         self.triangles[t].map(|v| self.points[v as usize])
     }
 
+    /// The normal of triangle `t` of the hierarchy, of any length; zero if it has no area.
+    #[inline]
+    pub(super) fn normal(&self, t: u32) -> DVec3 {
+        let [a, b, c] = self.corners(t as usize);
+        (b - a).cross(c - a)
+    }
+
     /// The point of triangle `t` of the hierarchy with these weights of the second and third corner, local.
     #[inline]
     pub(super) fn point_on(&self, t: u32, v: f64, w: f64) -> DVec3 {
