@@ -42,13 +42,10 @@ fn a_fifth_of_the_real_meshes_has_the_silhouette_of_the_whole() {
         println!("skipped: no ../shared/data");
         return;
     }
-    // The pirate's thumbs go: 0.976 is what this method reaches there (see README, limits).
-    for (name, floor) in
-        [("2CylinderEngine.glb", 0.98), ("bunny10k_textured.obj", 0.98), ("pirate.glb", 0.975)]
-    {
+    for name in ["2CylinderEngine.glb", "bunny10k_textured.obj", "pirate.glb"] {
         let scene = progmesh::io::files::read_scene(data.join(name)).unwrap().scene;
         let least = least_agreement(&scene, &fifth_as_glb(&scene));
         println!("{name}: {least:.4}");
-        assert!(least >= floor, "{name}: {least}");
+        assert!(least >= 0.98, "{name}: {least}");
     }
 }

@@ -5,11 +5,10 @@
 //! parallel, with the same result for any number of threads: ties go by edge id, and a verdict found in parallel is used only if nothing
 //! around has changed since.
 
-use crate::collapser::{Collapser, Refusal, Scratch};
+use crate::collapser::{Attempt, Collapser, Refusal, Scratch, Turn, Verdict};
 use crate::exact::{Goal, Progress};
 use crate::options::{Control, Stop};
 use crate::parallel::{map_chunks, map_init_chunks, threads};
-use glam::DVec3;
 use progmesh_aif::{Bits, EdgeId, Marks};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -33,7 +32,8 @@ const LEAST: usize = 256;
 /// Entries a task takes.
 const CHUNK: usize = 8192;
 
-/// An edge and its cost in common units, or a lower bound of it where the edge is dirty: costs never fall. Infinite when the kinds
+/// An edge and its cost in common units, or a lower bound of it where the edge is dirty: quadric costs never fall. Where a thin part would
+/// go, what was lost when last tried. Infinite when the kinds
 /// of its vertices, or the error bound, forbid the collapse.
 #[derive(Clone, Copy)]
 struct Entry {
@@ -67,7 +67,7 @@ struct Lane {
 struct Winner {
     entry: usize,
     key: u64,
-    verdict: Option<Result<DVec3, Refusal>>,
+    verdict: Option<Result<Verdict, Refusal>>,
 }
 
 /// Runs until the tail, then hands over to the exact schedule. `factors[i]` turns costs of mesh `i` into common ones.
@@ -89,7 +89,7 @@ pub(crate) fn run(meshes: &mut [Collapser<'_>], factors: &[f64], goal: &Goal, co
         for ((lane, m), &f) in lanes.iter_mut().zip(meshes.iter_mut()).zip(factors) {
             lane.evaluate(m, f, limit);
             let winners = lane.pick(m, limit, threads);
-            lane.perform(m, winners, &mut progress);
+            lane.perform(m, winners, (limit, f), &mut progress);
         }
         progress.report();
         if before - progress.left < need / STALL {
@@ -187,8 +187,15 @@ impl Lane {
         winners
     }
 
-    /// Collapses the winners, cheapest first only where not all are needed.
-    fn perform(&mut self, m: &mut Collapser<'_>, mut winners: Vec<Winner>, progress: &mut Progress<'_>) {
+    /// Collapses the winners, cheapest first only where not all are needed. Those that lose more than the
+    /// round's `ceiling` wait for another; `factor` turns costs into common ones.
+    fn perform(
+        &mut self,
+        m: &mut Collapser<'_>,
+        mut winners: Vec<Winner>,
+        (ceiling, factor): (f32, f64),
+        progress: &mut Progress<'_>,
+    ) {
         // Another mesh may have reached the goal already.
         if 2 * winners.len() > progress.left.saturating_sub(progress.goal) {
             winners.sort_unstable_by_key(|w| w.key);
@@ -206,13 +213,21 @@ impl Lane {
             let fresh = !t.edge_vertices(e).iter().any(|&v| self.touched.has(v));
             let Some(c) = m.evaluate(e) else { continue };
             let before = m.work.triangles;
+            let turn = Turn { ceiling, factor, left: progress.left };
             let done = match w.verdict.filter(|_| fresh) {
-                Some(verdict) => m.follow(e, &c, verdict, progress.left),
-                None => m.attempt(e, &c, progress.left),
+                Some(verdict) => m.follow(e, &c, verdict, turn),
+                None => m.attempt(e, &c, turn),
             };
-            if !done {
-                self.blocked.set(e.index());
-                continue;
+            match done {
+                Attempt::Done => {}
+                Attempt::Refused => {
+                    self.blocked.set(e.index());
+                    continue;
+                }
+                Attempt::Dearer(cost) => {
+                    self.entries[w.entry].cost = cost;
+                    continue;
+                }
             }
             let gone = before - m.work.triangles;
             progress.left -= gone;

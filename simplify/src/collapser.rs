@@ -4,6 +4,7 @@
 use crate::log::CollapseLog;
 use crate::options::{Options, Placement, Refused};
 use crate::quadric::Quadric;
+use crate::thin;
 use crate::validity::{HUB, MAX_VALENCE, RingFace, gather_ring};
 use crate::wedges::WedgeMerge;
 use crate::work::{Kind, Roles, Work};
@@ -62,6 +63,35 @@ pub(crate) struct Collapser<'m> {
 pub(crate) struct Scratch {
     marks: Marks,
     ring: Vec<RingFace>,
+}
+
+/// What a candidate that passes comes to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Verdict {
+    /// Where the kept vertex goes.
+    to: DVec3,
+    /// What goes that quadrics do not see, local units: the collapse has to wait until its turn comes at this cost.
+    loss: f64,
+}
+
+/// What became of a candidate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Attempt {
+    Done,
+    Refused,
+    /// Allowed, but not before the turn of this cost, in common units; more than the turn's ceiling.
+    Dearer(f32),
+}
+
+/// How things stand when the turn of a collapse comes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turn {
+    /// What it may lose (see [`thin`]), in common units, as schedules sort them.
+    pub(crate) ceiling: f32,
+    /// Turns local units into common ones.
+    pub(crate) factor: f64,
+    /// Triangles left over all meshes, for the log.
+    pub(crate) left: usize,
 }
 
 /// Why a candidate is refused.
@@ -139,12 +169,12 @@ impl<'m> Collapser<'m> {
         }
     }
 
-    /// Collapses the candidate if topology and geometry allow it. `left` goes to the log. O(valence).
-    pub(crate) fn attempt(&mut self, e: EdgeId, c: &Candidate, left: usize) -> bool {
+    /// Collapses the candidate if topology and geometry allow it, losing no more than `turn` allows. O(valence).
+    pub(crate) fn attempt(&mut self, e: EdgeId, c: &Candidate, turn: Turn) -> Attempt {
         let mut scratch = std::mem::take(&mut self.scratch);
         let verdict = self.check(e, c, &mut scratch);
         self.scratch = scratch;
-        self.follow(e, c, verdict, left)
+        self.follow(e, c, verdict, turn)
     }
 
     /// Does what a fresh [`Collapser::check`] found, and counts it.
@@ -152,21 +182,27 @@ impl<'m> Collapser<'m> {
         &mut self,
         e: EdgeId,
         c: &Candidate,
-        verdict: Result<DVec3, Refusal>,
-        left: usize,
-    ) -> bool {
-        if let Err(Refusal::Error) = verdict {
-            self.bounded = true;
-            return false;
-        }
-        self.tried += 1;
+        verdict: Result<Verdict, Refusal>,
+        turn: Turn,
+    ) -> Attempt {
         let refusal = match verdict {
-            Ok(to) => {
-                self.collapse(e, c, to, left);
-                return true;
+            Ok(v) => {
+                // Compared as it will be sorted: what is dearer goes back with a higher key, so it cannot come round for ever.
+                let loss = (v.loss * turn.factor) as f32;
+                if loss > turn.ceiling {
+                    return Attempt::Dearer(loss);
+                }
+                self.tried += 1;
+                self.collapse(e, c, v.to, turn.left);
+                return Attempt::Done;
+            }
+            Err(Refusal::Error) => {
+                self.bounded = true;
+                return Attempt::Refused;
             }
             Err(refusal) => refusal,
         };
+        self.tried += 1;
         match refusal {
             Refusal::Link => self.refused.link += 1,
             Refusal::Border => self.refused.border += 1,
@@ -174,11 +210,11 @@ impl<'m> Collapser<'m> {
             Refusal::Valence => self.refused.valence += 1,
             Refusal::Error => {}
         }
-        false
+        Attempt::Refused
     }
 
-    /// Where the kept vertex goes if the collapse is allowed. Reads the one-rings of both vertices. O(valence).
-    pub(crate) fn check(&self, e: EdgeId, c: &Candidate, scratch: &mut Scratch) -> Result<DVec3, Refusal> {
+    /// Where the kept vertex goes if the collapse is allowed, and what is lost. Reads the one-rings of both vertices. O(valence).
+    pub(crate) fn check(&self, e: EdgeId, c: &Candidate, scratch: &mut Scratch) -> Result<Verdict, Refusal> {
         let Roles { kept, removed, fixed } = c.roles;
         let work = &self.work;
         let Scratch { marks, ring } = scratch;
@@ -231,7 +267,8 @@ impl<'m> Collapser<'m> {
         if !moving.iter().all(|f| f.stays_good(to)) {
             return Err(Refusal::Flip);
         }
-        Ok(to)
+        let end = |v: VertexId| (points[v.index()], self.quadrics[v.index()].weight);
+        Ok(Verdict { to, loss: thin::loss(ring, to, [end(kept), end(removed)]) })
     }
 
     fn collapse(&mut self, e: EdgeId, c: &Candidate, to: DVec3, left: usize) {

@@ -1,9 +1,10 @@
 //! The exact schedule: always the cheapest edge of all meshes.
 //!
 //! A lazy heap: entries hold a cost and an edge; a popped entry whose edge has become dearer goes back with its new cost.
-//! That is exact for accumulated quadrics without normalisation, because their costs never fall.
+//! That is exact for accumulated quadrics without normalisation, because their costs never fall. What is found to lose a thin part only when
+//! its turn comes (see [`crate::thin`]) goes back likewise.
 
-use crate::collapser::Collapser;
+use crate::collapser::{Attempt, Collapser, Turn};
 use crate::options::{Control, Stop};
 use crate::radix_heap::RadixHeap;
 use progmesh_aif::{Bits, EdgeId};
@@ -143,18 +144,22 @@ pub(crate) fn run(meshes: &mut [Collapser<'_>], factors: &[f64], goal: &Goal, co
             continue;
         }
         let before = m.work.triangles;
-        if m.attempt(e, &c, progress.left) {
-            progress.left -= before - m.work.triangles;
-            for &x in m.work.mesh.topology().star(c.roles.kept) {
-                if waiting[i].get(x.index()) {
-                    waiting[i].clear(x.index());
-                    // Due at once, or just behind: its true cost is found out when it comes up.
-                    let due = (top >> 32 << 32) | numbering.number(i, x) as u64;
-                    heap.push(if due < top { due + (1 << 32) } else { due });
+        let ceiling = f32::from_bits((top >> 32) as u32);
+        let turn = Turn { ceiling, factor: factors[i], left: progress.left };
+        match m.attempt(e, &c, turn) {
+            Attempt::Done => {
+                progress.left -= before - m.work.triangles;
+                for &x in m.work.mesh.topology().star(c.roles.kept) {
+                    if waiting[i].get(x.index()) {
+                        waiting[i].clear(x.index());
+                        // Due at once, or just behind: its true cost is found out when it comes up.
+                        let due = (top >> 32 << 32) | numbering.number(i, x) as u64;
+                        heap.push(if due < top { due + (1 << 32) } else { due });
+                    }
                 }
             }
-        } else {
-            waiting[i].set(e.index());
+            Attempt::Refused => waiting[i].set(e.index()),
+            Attempt::Dearer(cost) => heap.push(key(cost as f64, top as u32)),
         }
     }
     match () {

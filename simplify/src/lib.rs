@@ -22,6 +22,7 @@ mod parallel;
 mod quadric;
 mod quadric_collapse;
 mod radix_heap;
+mod thin;
 mod validity;
 mod wedges;
 mod work;

@@ -37,7 +37,7 @@ mod query;
 mod sample;
 mod shape;
 mod surface;
-mod triangle;
+pub(crate) mod triangle;
 
 pub use certify::{Certified, CertifyOptions, Interval, Within, certify, within};
 pub use deviation::{CornerValues, Deviation, Deviations, TwoSided, deviations, turned_triangles};

@@ -4,10 +4,10 @@ use glam::DVec3;
 
 /// Where on a triangle: the weights of the second and the third corner, and the squared distance.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Foot {
-    pub(super) d2: f64,
-    pub(super) v: f64,
-    pub(super) w: f64,
+pub(crate) struct Foot {
+    pub(crate) d2: f64,
+    pub(crate) v: f64,
+    pub(crate) w: f64,
 }
 
 /// Squared sine of a corner's angle below which a triangle goes the careful way: the quick way squares the condition, and is off by 1e-16
@@ -19,7 +19,7 @@ const THIN: f64 = 1e-4;
 /// The weights are never negative and never sum to more than one (by more than rounding), so the point is one of the triangle and `d2` never
 /// below the true squared distance by more than rounding.
 #[inline]
-pub(super) fn closest(t: [DVec3; 3], p: DVec3) -> Foot {
+pub(crate) fn closest(t: [DVec3; 3], p: DVec3) -> Foot {
     let [a, b, c] = t;
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (bb, bc, cc) = (ab.length_squared(), ab.dot(ac), ac.length_squared());
@@ -84,7 +84,7 @@ fn closest_thin([a, b, c]: [DVec3; 3], p: DVec3) -> Foot {
 /// A bound below the distance of `p` from a triangle, given the offset of `p` from (about) its closest point: the triangle lies
 /// beyond the plane through its nearest corner in that direction. Right whatever the offset is, and tight when that is right.
 #[inline]
-pub(super) fn at_least(t: [DVec3; 3], p: DVec3, offset: DVec3) -> f64 {
+pub(crate) fn at_least(t: [DVec3; 3], p: DVec3, offset: DVec3) -> f64 {
     let length = offset.length();
     if length == 0.0 {
         return 0.0;
