@@ -18,6 +18,7 @@ pub use build::{Built, BuiltAll, EncodeError, build, build_all};
 pub use cursor::{Cursor, Damage, Patch};
 pub use input::{InputOrder, Polygons, same_positions};
 pub use order::NotInOrder;
+pub(crate) use order::RowsOf;
 
 use crate::aif::{Channel, NONE, Positions};
 
@@ -234,6 +235,12 @@ impl ProgressiveMesh {
     pub fn faces(&self) -> usize {
         let two = self.splits.code.iter().filter(|c| c.two_faces()).count();
         self.base_faces.len() + self.splits.len() + two
+    }
+
+    /// Wedges at full detail; vertices without attributes. O(n).
+    pub fn wedge_slots(&self) -> usize {
+        let Some(w) = &self.wedges else { return self.vertices() };
+        w.base_vertex.len() + self.rows_of_splits().iter().map(|r| r.new as usize).sum::<usize>()
     }
 
     /// A cursor at the base.

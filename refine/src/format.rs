@@ -1,0 +1,43 @@
+//! The `.pm` file: progressive meshes as a stream of chunks. `FORMAT.md` specifies it.
+//!
+//! A file has a directory, the bases, then the splits, coarse to fine: by bands of error, within a band subtree by subtree. So every beginning that ends
+//! with a chunk is a mesh, each chunk is one range of bytes, and each can be read alone. [`encode`] writes, [`decode`] reads all,
+//! [`PmReader`] reads a stream as it arrives, [`RangeReader`] reads chunks in any order.
+//!
+//! Guaranteed: what was written is read bit for bit (errors of splits, which are estimates, are rounded up); the same bytes for every number of
+//! threads; damage is an error that names the chunk, never a panic, and takes memory in proportion to the bytes that are there. Not guaranteed: that a
+//! file whose checksums are right leads through its splits without [`crate::progressive::Damage`]; cursors find that.
+
+mod base;
+mod coder;
+mod connect;
+mod container;
+mod input_order;
+mod places;
+mod plan;
+mod read;
+mod rows;
+mod splits;
+mod write;
+
+pub use base::MeshHead;
+pub use container::{Chunk, ChunkType, Directory, FormatError, MAGIC, VERSION};
+pub use places::Lattice;
+pub use read::{
+    Assembly, ByteRanges, Decoded, Piece, PmReader, RangeReader, Report, StreamSizes, decode, decode_prefix,
+};
+pub use splits::SplitBlock;
+pub use write::{EncodeError, EncodeOptions, encode};
+
+/// `f` of each, in order; on several threads with feature `parallel`.
+#[cfg(feature = "parallel")]
+fn each<T: Send, U: Send>(items: Vec<T>, f: impl Fn(T) -> U + Sync + Send) -> Vec<U> {
+    use rayon::prelude::*;
+    items.into_par_iter().map(f).collect()
+}
+
+/// `f` of each, in order.
+#[cfg(not(feature = "parallel"))]
+fn each<T, U>(items: Vec<T>, f: impl Fn(T) -> U) -> Vec<U> {
+    items.into_iter().map(f).collect()
+}

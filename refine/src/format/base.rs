@@ -1,0 +1,344 @@
+//! The chunk that begins a mesh: what is true of all of it, and the mesh before the first split.
+
+use super::coder::{Coder, Decoder, Encoder, Number, put_varint, take_varint};
+use super::places::{self, Lattice, MAX_LATTICES, Places};
+use super::rows::Rows;
+use crate::aif::{Channel, Encoding, NONE, Semantic};
+use crate::progressive::{ProgressiveMesh, WedgeStreams};
+
+/// What is true of a whole mesh; needed to read any chunk of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeshHead {
+    /// Splits at full detail.
+    pub splits: u32,
+    /// Vertices of the base.
+    pub base_vertices: u32,
+    /// Faces of the base.
+    pub base_faces: u32,
+    /// Wedges of the base; as many as vertices without attributes.
+    pub base_wedges: u32,
+    /// Edges without a face.
+    pub wires: u32,
+    /// Positions are f64.
+    pub double: bool,
+    /// Attributes.
+    pub channels: Option<Vec<Channel>>,
+    /// Faces have materials.
+    pub materials: bool,
+    /// Faces have groups.
+    pub groups: bool,
+    /// Lattices that positions may lie on, at most two.
+    pub lattices: Vec<Lattice>,
+    /// Split counts at which levels stand.
+    pub levels: Vec<u32>,
+    /// What quantising moved a vertex by at most, model units; 0 without.
+    pub quantisation_error: f64,
+}
+
+const DOUBLE: u8 = 1;
+const ATTRIBUTES: u8 = 2;
+const MATERIALS: u8 = 4;
+const GROUPS: u8 = 8;
+
+impl MeshHead {
+    /// Numbers in a row of attributes.
+    pub(super) fn stride(&self) -> usize {
+        self.channels.iter().flatten().map(|c| c.width).sum()
+    }
+
+    fn write(&self, out: &mut Vec<u8>) {
+        let flag = |on: bool, bit: u8| if on { bit } else { 0 };
+        out.push(
+            flag(self.double, DOUBLE)
+                | flag(self.channels.is_some(), ATTRIBUTES)
+                | flag(self.materials, MATERIALS)
+                | flag(self.groups, GROUPS),
+        );
+        for n in [self.splits, self.base_vertices, self.base_faces, self.base_wedges, self.wires] {
+            put_varint(out, n as u64);
+        }
+        out.extend_from_slice(&self.quantisation_error.to_le_bytes());
+        out.push(self.lattices.len() as u8);
+        for l in &self.lattices {
+            for x in l.origin.iter().chain([&l.step, &l.parts]) {
+                out.extend_from_slice(&x.to_le_bytes());
+            }
+        }
+        put_varint(out, self.levels.len() as u64);
+        self.levels.iter().for_each(|&l| put_varint(out, l as u64));
+        if let Some(channels) = &self.channels {
+            out.push(channels.len() as u8);
+            for c in channels {
+                write_channel(c, out);
+            }
+        }
+    }
+
+    fn read(from: &mut &[u8]) -> Option<MeshHead> {
+        let flags = take_byte(from)?;
+        let mut h = MeshHead {
+            double: flags & DOUBLE != 0,
+            materials: flags & MATERIALS != 0,
+            groups: flags & GROUPS != 0,
+            ..Default::default()
+        };
+        for n in [&mut h.splits, &mut h.base_vertices, &mut h.base_faces, &mut h.base_wedges, &mut h.wires] {
+            *n = u32::try_from(take_varint(from)?).ok()?;
+        }
+        h.quantisation_error = take_f64(from)?;
+        let lattices = take_byte(from)? as usize;
+        if lattices > MAX_LATTICES {
+            return None;
+        }
+        for _ in 0..lattices {
+            let mut x = [0.0; 5];
+            for x in &mut x {
+                *x = take_f64(from)?;
+            }
+            let l = Lattice { origin: [x[0], x[1], x[2]], step: x[3], parts: x[4] };
+            h.lattices.push(Some(l).filter(Lattice::is_sound)?);
+        }
+        let levels = take_varint(from)?;
+        if levels > from.len() as u64 {
+            return None;
+        }
+        for _ in 0..levels {
+            let level = u32::try_from(take_varint(from)?).ok()?;
+            if level > h.splits || h.levels.last().is_some_and(|&l| l >= level) {
+                return None;
+            }
+            h.levels.push(level);
+        }
+        if flags & ATTRIBUTES != 0 {
+            let count = take_byte(from)? as usize;
+            if count > 64 {
+                return None;
+            }
+            let channels: Option<Vec<_>> = (0..count).map(|_| read_channel(from)).collect();
+            h.channels = Some(channels?);
+        }
+        Some(h)
+    }
+}
+
+fn take_byte(from: &mut &[u8]) -> Option<u8> {
+    let (&byte, rest) = from.split_first()?;
+    *from = rest;
+    Some(byte)
+}
+
+fn take_f64(from: &mut &[u8]) -> Option<f64> {
+    let (bytes, rest) = from.split_first_chunk()?;
+    *from = rest;
+    Some(f64::from_le_bytes(*bytes))
+}
+
+/// Meanings by number; the number of the set or target follows, or the name.
+fn write_channel(c: &Channel, out: &mut Vec<u8>) {
+    let (kind, k) = match &c.semantic {
+        Semantic::Normal => (0, 0),
+        Semantic::Tangent => (1, 0),
+        Semantic::TexCoord(k) => (2, *k as u64),
+        Semantic::Color(k) => (3, *k as u64),
+        Semantic::Joints(k) => (4, *k as u64),
+        Semantic::Weights(k) => (5, *k as u64),
+        Semantic::MorphPosition(k) => (6, *k as u64),
+        Semantic::MorphNormal(k) => (7, *k as u64),
+        Semantic::MorphTangent(k) => (8, *k as u64),
+        Semantic::Custom(name) => (9, name.len() as u64),
+    };
+    out.push(kind);
+    put_varint(out, k);
+    if let Semantic::Custom(name) = &c.semantic {
+        out.extend_from_slice(name.as_bytes());
+    }
+    put_varint(out, c.width as u64);
+    let encoding = ENCODINGS.iter().position(|&e| e == c.encoding).unwrap_or(0);
+    out.push(encoding as u8);
+}
+
+const ENCODINGS: [Encoding; 12] = [
+    Encoding::F32,
+    Encoding::F64,
+    Encoding::U8,
+    Encoding::U8Norm,
+    Encoding::I8,
+    Encoding::I8Norm,
+    Encoding::U16,
+    Encoding::U16Norm,
+    Encoding::I16,
+    Encoding::I16Norm,
+    Encoding::U32,
+    Encoding::I32,
+];
+
+/// The widest channel taken: a row of 64 of them still is small.
+const WIDEST: u64 = 1 << 12;
+
+fn read_channel(from: &mut &[u8]) -> Option<Channel> {
+    let kind = take_byte(from)?;
+    let k = take_varint(from)?;
+    let (byte, short) = (u8::try_from(k).ok(), u16::try_from(k).ok());
+    let semantic = match kind {
+        0 => Semantic::Normal,
+        1 => Semantic::Tangent,
+        2 => Semantic::TexCoord(byte?),
+        3 => Semantic::Color(byte?),
+        4 => Semantic::Joints(byte?),
+        5 => Semantic::Weights(byte?),
+        6 => Semantic::MorphPosition(short?),
+        7 => Semantic::MorphNormal(short?),
+        8 => Semantic::MorphTangent(short?),
+        9 => {
+            let (name, rest) = from.split_at_checked(usize::try_from(k).ok()?)?;
+            *from = rest;
+            Semantic::Custom(std::str::from_utf8(name).ok()?.to_string())
+        }
+        _ => return None,
+    };
+    let width = take_varint(from)?;
+    let &encoding = ENCODINGS.get(take_byte(from)? as usize)?;
+    Some(Channel { semantic, width: usize::try_from(width).ok().filter(|_| width <= WIDEST)?, encoding })
+}
+
+/// Codes faces, wires, positions, attributes and materials of the base.
+struct BaseModels {
+    corner: [Number; 3],
+    wire: [Number; 2],
+    wedge: Number,
+    face: [Number; 2],
+}
+
+fn code_base<C: Coder>(c: &mut C, head: &MeshHead, pm: &mut ProgressiveMesh) -> Option<()> {
+    let mut m = BaseModels {
+        corner: Default::default(),
+        wire: Default::default(),
+        wedge: Default::default(),
+        face: Default::default(),
+    };
+    let fits = |x: i64, below: u32| u32::try_from(x).ok().filter(|&x| x < below);
+    // Places, each expected where the one before is.
+    let mut coder = Places::new(head.double, &head.lattices);
+    let mut last = [0.0; 3];
+    for i in 0..head.base_vertices as usize {
+        let x = if C::READS { last } else { places::point(&pm.base_positions, i) };
+        last = coder.code(c, 0, last, x);
+        if C::READS {
+            places::push(&mut pm.base_positions, last);
+            if c.spent() {
+                return None;
+            }
+        }
+    }
+    // A corner by its difference from that of the face before.
+    let mut before = [0u32; 3];
+    for i in 0..head.base_faces as usize {
+        let face = if C::READS { before } else { pm.base_faces[i] };
+        let mut new = [0; 3];
+        for k in 0..3 {
+            let guess = i64::from(if k == 0 { before[0] } else { new[k - 1] });
+            let x = guess.wrapping_add(c.signed(&mut m.corner[k], face[k] as i64 - guess));
+            new[k] = fits(x, head.base_wedges)?;
+        }
+        before = new;
+        if C::READS {
+            pm.base_faces.push(new);
+            if c.spent() {
+                return None;
+            }
+        }
+    }
+    for i in 0..head.wires as usize {
+        let wire = if C::READS { [0; 2] } else { pm.wires[i] };
+        let mut new = [0; 2];
+        for k in 0..2 {
+            new[k] = fits(c.signed(&mut m.wire[k], wire[k] as i64), head.base_vertices)?;
+        }
+        if C::READS {
+            pm.wires.push(new);
+            if c.spent() {
+                return None;
+            }
+        }
+    }
+    for (k, (on, values)) in
+        [(head.materials, &mut pm.face_material), (head.groups, &mut pm.face_group)].into_iter().enumerate()
+    {
+        let mut last = 0;
+        for i in 0..if on { head.base_faces as usize } else { 0 } {
+            let value = if C::READS { last } else { values[i] };
+            // NONE is 0.
+            let x = c
+                .signed(&mut m.face[k], value.wrapping_add(1) as i64 - last as i64)
+                .wrapping_add(last as i64);
+            last = u32::try_from(x).ok()?;
+            if C::READS {
+                values.push(last.wrapping_sub(1));
+                if c.spent() {
+                    return None;
+                }
+            }
+        }
+    }
+    if let (Some(channels), Some(w)) = (&head.channels, &mut pm.wedges) {
+        let mut rows = Rows::new(channels);
+        let mut last = 0;
+        for i in 0..head.base_wedges as usize {
+            let v = if C::READS { 0 } else { w.base_vertex[i] };
+            last = fits(c.signed(&mut m.wedge, v as i64 - last as i64) + last as i64, head.base_vertices)?;
+            let source = (!C::READS).then(|| (w.present[i], &w.rows[i * w.stride..(i + 1) * w.stride]));
+            let present = rows.code(c, NONE, source);
+            if C::READS {
+                w.base_vertex.push(last);
+                w.rows.extend_from_slice(rows.row());
+                w.present.push(present);
+                if c.spent() {
+                    return None;
+                }
+            }
+        }
+    }
+    Some(())
+}
+
+/// The chunk's bytes.
+pub(super) fn write(head: &MeshHead, pm: &mut ProgressiveMesh) -> Option<Vec<u8>> {
+    let mut out = Vec::new();
+    head.write(&mut out);
+    let mut e = Encoder::default();
+    code_base(&mut e, head, pm)?;
+    e.finish(&mut out);
+    Some(out)
+}
+
+/// Bytes that the arrays of the base take in memory.
+pub(super) fn raw_bytes(h: &MeshHead) -> u64 {
+    let wedge = if h.channels.is_some() { 12 + 4 * h.stride() as u64 } else { 0 };
+    let face = 12 + 4 * (h.materials as u64 + h.groups as u64);
+    h.base_vertices as u64 * if h.double { 24 } else { 12 }
+        + h.base_faces as u64 * face
+        + h.base_wedges as u64 * wedge
+        + h.wires as u64 * 8
+}
+
+/// The mesh's head, and the mesh without splits.
+///
+/// `None`: damage, or arrays that take other than `raw` bytes.
+pub(super) fn read(bytes: &[u8], raw: u64) -> Option<(MeshHead, ProgressiveMesh)> {
+    let mut rest = bytes;
+    let head = MeshHead::read(&mut rest).filter(|h| raw_bytes(h) == raw)?;
+    let mut pm = ProgressiveMesh {
+        base_positions: places::empty(head.double),
+        new_positions: places::empty(head.double),
+        moved_positions: places::empty(head.double),
+        wedges: head.channels.as_ref().map(|channels| WedgeStreams {
+            channels: channels.clone(),
+            stride: head.stride(),
+            ..Default::default()
+        }),
+        ..Default::default()
+    };
+    let mut d = Decoder::new(rest)?;
+    code_base(&mut d, &head, &mut pm)?;
+    Some((head, pm)).filter(|_| !d.spent())
+}

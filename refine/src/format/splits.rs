@@ -1,0 +1,415 @@
+//! Chunks of vertex splits: each is read alone, given the head of its mesh.
+
+use super::base::MeshHead;
+use super::coder::{Bit, Coder, Decoder, Encoder, Number, put_varint, take_varint};
+use super::connect::{Connect, Step};
+use super::places::{self, Places};
+use super::rows::Rows;
+use crate::aif::{NONE, Positions};
+use crate::progressive::{ProgressiveMesh, SplitCode, SplitKind, Splits};
+
+/// Consecutive splits of a mesh, with all that belongs to them: parts of the arrays of a [`ProgressiveMesh`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SplitBlock {
+    /// The first split.
+    pub first: u32,
+    /// The first face they make.
+    pub first_face: u32,
+    /// The first wedge they make.
+    pub first_wedge: u32,
+    /// Wedges they make; 0 without attributes.
+    pub wedges: u32,
+    /// The splits, with absolute references.
+    pub splits: Splits,
+    /// As in [`ProgressiveMesh::new_positions`].
+    pub new_positions: Positions,
+    /// As in [`ProgressiveMesh::moved_positions`].
+    pub moved_positions: Positions,
+    /// As in [`crate::progressive::WedgeStreams::rows`].
+    pub rows: Vec<f32>,
+    /// As in [`crate::progressive::WedgeStreams::present`].
+    pub present: Vec<u64>,
+    /// As in [`crate::progressive::WedgeStreams::explicit`].
+    pub explicit: Vec<u32>,
+    /// Materials of the faces they make, if the mesh has any.
+    pub face_material: Vec<u32>,
+    /// Groups of the faces they make, if the mesh has any.
+    pub face_group: Vec<u32>,
+}
+
+/// Kinds of streams within a chunk of splits, in the order in which they stand there.
+pub(super) const STREAMS: usize = 5;
+const CONNECTIVITY: usize = 0;
+const ERRORS: usize = 1;
+const PLACES: usize = 2;
+const ATTRIBUTES: usize = 3;
+const FACES: usize = 4;
+
+impl SplitBlock {
+    /// Faces they make.
+    pub fn faces(&self) -> usize {
+        self.splits.len() + self.splits.code.iter().filter(|c| c.two_faces()).count()
+    }
+
+    /// Wedges they make.
+    pub(super) fn new_wedges(&self) -> usize {
+        self.wedges as usize
+    }
+
+    /// Bytes the arrays take.
+    pub fn bytes(&self) -> u64 {
+        18 * self.splits.len() as u64
+            + places::bytes(&self.new_positions)
+            + places::bytes(&self.moved_positions)
+            + 4 * (self.rows.len() + self.explicit.len() + self.face_material.len() + self.face_group.len())
+                as u64
+            + 8 * self.present.len() as u64
+    }
+
+    /// Appends the splits to `pm`, whose last split is the one before; false (and nothing done) if it is not.
+    pub fn append_to(&self, pm: &mut ProgressiveMesh) -> bool {
+        if self.first as usize != pm.splits.len() {
+            return false;
+        }
+        let (to, from) = (&mut pm.splits, &self.splits);
+        to.vertex.extend_from_slice(&from.vertex);
+        to.left.extend_from_slice(&from.left);
+        to.right.extend_from_slice(&from.right);
+        to.code.extend_from_slice(&from.code);
+        to.error.extend_from_slice(&from.error);
+        append(&mut pm.new_positions, &self.new_positions);
+        append(&mut pm.moved_positions, &self.moved_positions);
+        if let Some(w) = &mut pm.wedges {
+            w.rows.extend_from_slice(&self.rows);
+            w.present.extend_from_slice(&self.present);
+            w.explicit.extend_from_slice(&self.explicit);
+        }
+        pm.face_material.extend_from_slice(&self.face_material);
+        pm.face_group.extend_from_slice(&self.face_group);
+        true
+    }
+}
+
+fn append(to: &mut Positions, from: &Positions) {
+    match (to, from) {
+        (Positions::F32(a), Positions::F32(b)) => a.extend_from_slice(b),
+        (Positions::F64(a), Positions::F64(b)) => a.extend_from_slice(b),
+        _ => {}
+    }
+}
+
+/// Where the arrays of a mesh stand before a split.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Counts {
+    pub(super) split: usize,
+    pub(super) face: usize,
+    pub(super) wedge: usize,
+    pub(super) row: usize,
+    pub(super) moved: usize,
+    pub(super) explicit: usize,
+}
+
+/// Errors in the file: the upper 11 bits of an f32 below the sign, rounded up: 3 bits of mantissa.
+const ERROR_SHIFT: u32 = 20;
+
+/// `error` as the file keeps it: never less, at most an eighth more.
+pub(super) fn rounded_error(error: f32) -> f32 {
+    f32::from_bits(error_level(error) << ERROR_SHIFT)
+}
+
+fn error_level(error: f32) -> u32 {
+    if error > 0.0 { error.min(f32::MAX).to_bits().div_ceil(1 << ERROR_SHIFT) } else { 0 }
+}
+
+/// One description of the chunk for both directions: `source` when writing, `out` when reading.
+struct Codec<'a> {
+    head: &'a MeshHead,
+    connect: Connect,
+    places: Places<'a>,
+    rows: Option<Rows>,
+    error: Number,
+    error_before: u32,
+    explicit: [Number; 6],
+    none: [Bit; 3],
+    face_same: [Bit; 2],
+    face_value: [Number; 2],
+    face_last: [u32; 2],
+}
+
+struct Source<'a> {
+    pm: &'a ProgressiveMesh,
+    at: Counts,
+}
+
+impl<'a> Codec<'a> {
+    fn new(head: &'a MeshHead, first: Counts) -> Self {
+        Codec {
+            head,
+            connect: Connect::new(head, first),
+            places: Places::new(head.double, &head.lattices),
+            rows: head.channels.as_deref().map(Rows::new),
+            error: Number::default(),
+            error_before: 0,
+            explicit: Default::default(),
+            none: Default::default(),
+            face_same: Default::default(),
+            face_value: Default::default(),
+            face_last: [NONE; 2],
+        }
+    }
+
+    /// Codes the next split; `None` for references that cannot be.
+    fn split<C: Coder>(
+        &mut self,
+        c: &mut [C; STREAMS],
+        source: &mut Option<Source<'_>>,
+        out: &mut SplitBlock,
+    ) -> Option<()> {
+        let step = source.as_ref().map_or(Step::default(), |s| {
+            let (i, splits) = (s.at.split, &s.pm.splits);
+            Step {
+                vertex: splits.vertex[i],
+                left: splits.left[i],
+                right: splits.right[i],
+                code: splits.code[i],
+            }
+        });
+        let step = self.connect.code(&mut c[CONNECTIVITY], step)?;
+        // Error.
+        let level = source.as_ref().map_or(0, |s| error_level(s.pm.splits.error[s.at.split])) as i64;
+        let before = self.error_before as i64;
+        let level = c[ERRORS].signed(&mut self.error, level - before).wrapping_add(before);
+        self.error_before = u32::try_from(level).ok().filter(|&l| l <= 0x7F8)?;
+        // Places.
+        let expected = self.connect.expected();
+        let at = source.as_ref().map_or([0.0; 3], |s| places::point(&s.pm.new_positions, s.at.split));
+        let at = self.places.code(&mut c[PLACES], 1, expected, at);
+        let mut moved = None;
+        if step.code.moves() {
+            let to = source.as_ref().map_or([0.0; 3], |s| places::point(&s.pm.moved_positions, s.at.moved));
+            moved = Some(self.places.code(&mut c[PLACES], 2, at, to));
+        }
+        self.connect.placed(at, moved);
+        if C::READS {
+            out.splits.vertex.push(step.vertex);
+            out.splits.left.push(step.left);
+            out.splits.right.push(step.right);
+            out.splits.code.push(step.code);
+            out.splits.error.push(f32::from_bits(self.error_before << ERROR_SHIFT));
+            places::push(&mut out.new_positions, at);
+            moved.iter().for_each(|&to| places::push(&mut out.moved_positions, to));
+        }
+        let (new, changed) = self.wedges(&mut c[ATTRIBUTES], step, source, out)?;
+        let faces = 1 + step.code.two_faces() as usize;
+        for k in 0..2 {
+            if [self.head.materials, self.head.groups][k] {
+                for f in 0..faces {
+                    let value = source
+                        .as_ref()
+                        .map_or(0, |s| [&s.pm.face_material, &s.pm.face_group][k][s.at.face + f]);
+                    let value = self.face(&mut c[FACES], k, value)?;
+                    if C::READS {
+                        [&mut out.face_material, &mut out.face_group][k].push(value);
+                    }
+                }
+            }
+        }
+        if self.rows.is_some() {
+            out.wedges += new as u32;
+        }
+        if let Some(s) = source {
+            s.at.split += 1;
+            s.at.face += faces;
+            s.at.wedge += new;
+            s.at.moved += moved.is_some() as usize;
+            if self.rows.is_some() {
+                s.at.row += new + changed;
+            }
+        }
+        Some(())
+    }
+
+    /// A material or group: mostly that of the face before.
+    fn face<C: Coder>(&mut self, c: &mut C, k: usize, value: u32) -> Option<u32> {
+        let last = self.face_last[k];
+        if !c.bit(&mut self.face_same[k], value == last) {
+            // NONE is 0.
+            let x = c.number(&mut self.face_value[k], value.wrapping_add(1) as u64);
+            self.face_last[k] = u32::try_from(x).ok()?.wrapping_sub(1);
+        }
+        Some(self.face_last[k])
+    }
+
+    /// Explicit wedges and rows; returns the numbers of new and of changed wedges.
+    fn wedges<C: Coder>(
+        &mut self,
+        c: &mut C,
+        step: Step,
+        source: &mut Option<Source<'_>>,
+        out: &mut SplitBlock,
+    ) -> Option<(usize, usize)> {
+        let Some(rows) = &mut self.rows else {
+            return Some((1, 0))
+                .filter(|_| step.code.kind() == SplitKind::Plain && !step.code.changes_rows());
+        };
+        let wedge = self.connect.next_wedge;
+        let (mut new, mut changed) = (1, step.code.changes_rows() as usize);
+        match step.code.kind() {
+            SplitKind::Plain => {}
+            SplitKind::Seam => (new, changed) = (2, 2 * changed),
+            SplitKind::Explicit => {
+                let list =
+                    source.as_ref().and_then(|s| s.pm.wedges.as_ref()).map_or(&[][..], |w| &w.explicit);
+                let mut at = source.as_ref().map_or(0, |s| s.at.explicit);
+                let mut next = || {
+                    at += 1;
+                    list.get(at - 1).copied().unwrap_or(0)
+                };
+                let pairs = c.number(&mut self.explicit[0], next() as u64);
+                let listed = c.number(&mut self.explicit[1], next() as u64);
+                let start = out.explicit.len();
+                if C::READS {
+                    out.explicit.extend([u32::try_from(pairs).ok()?, u32::try_from(listed).ok()?]);
+                }
+                new = 0;
+                let tips = 3 + 3 * step.code.two_faces() as u64;
+                for k in 0..(2 * pairs).checked_add(listed)?.checked_add(tips)? {
+                    let (m, flag) = match k {
+                        _ if k >= 2 * pairs + listed => (4 + ((k - 2 * pairs - listed) % 3 == 2) as usize, 2),
+                        _ if k >= 2 * pairs => (3, 1),
+                        _ => (2, 0),
+                    };
+                    let value = next();
+                    let id = if c.bit(&mut self.none[flag], value == NONE) {
+                        NONE
+                    } else {
+                        let x = wedge as i64 - c.signed(&mut self.explicit[m], wedge as i64 - value as i64);
+                        u32::try_from(x).ok()?
+                    };
+                    new += (k < 2 * pairs && k % 2 == 1 && id != NONE && id as usize >= wedge) as usize;
+                    if C::READS {
+                        out.explicit.push(id);
+                        if c.spent() {
+                            return None;
+                        }
+                    }
+                }
+                changed = listed as usize;
+                if C::READS && out.explicit.len() - start < 5 {
+                    return None;
+                }
+                if let Some(s) = source {
+                    s.at.explicit = at;
+                }
+            }
+        }
+        for k in 0..new.checked_add(changed)? {
+            let row = source.as_ref().and_then(|s| {
+                let w = s.pm.wedges.as_ref()?;
+                let r = s.at.row + k;
+                Some((w.present[r], &w.rows[r * w.stride..(r + 1) * w.stride]))
+            });
+            let present = rows.code(c, step.vertex, row);
+            if C::READS {
+                out.rows.extend_from_slice(rows.row());
+                out.present.push(present);
+                if c.spent() {
+                    return None;
+                }
+            }
+        }
+        self.connect.next_wedge += new;
+        Some((new, changed))
+    }
+}
+
+/// Bytes of each stream of a chunk.
+pub(super) type Sizes = [u64; STREAMS];
+
+/// The chunk of `count` splits from `first` on; with the bytes of each of its streams. `None` if the arrays contradict each other.
+pub(super) fn write(
+    head: &MeshHead,
+    pm: &ProgressiveMesh,
+    first: Counts,
+    count: usize,
+) -> Option<(Vec<u8>, Sizes)> {
+    let mut streams: [Encoder; STREAMS] = Default::default();
+    let mut codec = Codec::new(head, first);
+    codec.connect.begin(&mut streams[CONNECTIVITY], &pm.splits.vertex[first.split..first.split + count])?;
+    let mut source = Some(Source { pm, at: first });
+    let mut nothing = SplitBlock::default();
+    for _ in 0..count {
+        codec.split(&mut streams, &mut source, &mut nothing)?;
+    }
+    let mut out = Vec::new();
+    put_varint(&mut out, first.wedge as u64);
+    let mut sizes = Sizes::default();
+    for (stream, size) in streams.into_iter().zip(&mut sizes) {
+        let mut bytes = Vec::new();
+        stream.finish(&mut bytes);
+        put_varint(&mut out, bytes.len() as u64);
+        out.extend_from_slice(&bytes);
+        *size = bytes.len() as u64;
+    }
+    Some((out, sizes))
+}
+
+/// Reads a chunk alone. `None`: damage.
+pub(super) fn read(
+    head: &MeshHead,
+    (first, first_face): (u32, u32),
+    count: usize,
+    raw: u64,
+    mut bytes: &[u8],
+) -> Option<SplitBlock> {
+    let first_wedge = u32::try_from(take_varint(&mut bytes)?).ok()?;
+    let mut next = || {
+        let length = usize::try_from(take_varint(&mut bytes)?).ok()?;
+        let (stream, rest) = bytes.split_at_checked(length)?;
+        bytes = rest;
+        Decoder::new(stream)
+    };
+    let mut streams = [next()?, next()?, next()?, next()?, next()?];
+    let at = Counts {
+        split: first as usize,
+        face: first_face as usize,
+        wedge: first_wedge as usize,
+        ..Default::default()
+    };
+    let mut out = SplitBlock {
+        first,
+        first_face,
+        first_wedge,
+        new_positions: places::empty(head.double),
+        moved_positions: places::empty(head.double),
+        ..Default::default()
+    };
+    let mut codec = Codec::new(head, at);
+    codec.connect.begin(&mut streams[CONNECTIVITY], &[])?;
+    for _ in 0..count {
+        codec.split(&mut streams, &mut None, &mut out)?;
+        if streams.iter().any(Coder::spent) || out.bytes() > raw {
+            return None;
+        }
+    }
+    Some(out).filter(|o| o.bytes() == raw)
+}
+
+/// The sizes of the streams of a chunk.
+pub(super) fn sizes(mut bytes: &[u8]) -> Option<Sizes> {
+    take_varint(&mut bytes)?;
+    let mut sizes = Sizes::default();
+    for size in &mut sizes {
+        *size = take_varint(&mut bytes)?;
+        bytes = bytes.get(usize::try_from(*size).ok()?..)?;
+    }
+    Some(sizes)
+}
+
+/// A code's bits without the arrangement of corners, which chunks of splits leave to the order: tips first.
+pub(super) fn without_arrangement(code: SplitCode) -> SplitCode {
+    // Arrangements 0..3 and 3..6 differ by which of both vertices follows the tip.
+    let side = |a: u16| if a >= 3 { 3 } else { 0 };
+    let (l, r) = (code.0 & 7, code.0 >> 3 & 7);
+    SplitCode(code.0 & !0x3F | side(l) | side(r) << 3)
+}

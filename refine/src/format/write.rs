@@ -1,0 +1,233 @@
+//! Progressive meshes to a file.
+
+use super::base::{self, MeshHead};
+use super::container::{Chunk, ChunkType, Directory, EXPANSION};
+use super::input_order;
+use super::places::Lattice;
+use super::plan::{Piece, Plan};
+use super::splits::{self, Counts};
+use crate::progressive::{Damage, ProgressiveMesh, RowsOf};
+
+/// How to write.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct EncodeOptions {
+    /// Leave the input's numbering out: vertices and faces at full detail come in the order of the file, polygons as triangles.
+    pub any_order: bool,
+    /// Move all vertices onto a grid of `2^bits` cells along the longest side of each mesh's box; 2..=30. Smaller files, but lossy.
+    pub quantize: Option<u32>,
+}
+
+impl EncodeOptions {
+    /// Sets [`EncodeOptions::any_order`].
+    pub fn with_any_order(mut self, on: bool) -> Self {
+        self.any_order = on;
+        self
+    }
+
+    /// Sets [`EncodeOptions::quantize`].
+    pub fn with_quantize(mut self, bits: Option<u32>) -> Self {
+        self.quantize = bits;
+        self
+    }
+}
+
+/// Why nothing was written.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EncodeError {
+    /// The arrays of a mesh contradict each other.
+    #[error("mesh {mesh}: {damage}")]
+    Damage {
+        /// Which.
+        mesh: usize,
+        /// How.
+        damage: Damage,
+    },
+    /// A mesh's parts do not go together in a way that [`Damage`] has no word for.
+    #[error("mesh {0}: its arrays contradict each other")]
+    Inconsistent(usize),
+    /// Quantisation by other than 2 to 30 bits.
+    #[error("quantising to {0} bits: 2 to 30 are possible")]
+    Bits(u32),
+}
+
+/// A chunk and its bytes.
+struct Part {
+    chunk: Chunk,
+    bytes: Vec<u8>,
+    /// Where in the common order of all splits it belongs: the mean of its splits' places.
+    turn: f64,
+}
+
+fn part(kind: ChunkType, critical: bool, mesh: u32, raw: u64, mut bytes: Vec<u8>) -> Part {
+    bytes.resize(bytes.len().max(raw.div_ceil(EXPANSION) as usize), 0);
+    let chunk = Chunk {
+        kind,
+        index: 0,
+        critical,
+        mesh,
+        first: 0,
+        count: 0,
+        first_face: 0,
+        band: 0,
+        subtree: 0,
+        error: 0.0,
+        offset: 0,
+        stored: bytes.len() as u64,
+        raw,
+        checksum: crc32fast::hash(&bytes),
+    };
+    Part { chunk, bytes, turn: 0.0 }
+}
+
+/// Writes progressive meshes as a `.pm` file, which FORMAT.md specifies.
+///
+/// `turns` is the common order of the splits of all meshes, as in [`crate::progressive::BuiltAll::turns`] (empty: mesh after mesh); `scene` is kept as it is. The
+/// splits come in another order in the file than in `meshes`, and so have other numbers ([`ProgressiveMesh::reordered`]); errors are rounded up by
+/// at most an eighth; all else is kept. The bytes do not depend on the number of threads. O(n log n).
+///
+/// Errors: damaged meshes, bits out of range.
+pub fn encode(
+    meshes: &[ProgressiveMesh],
+    turns: &[u32],
+    scene: &[u8],
+    options: &EncodeOptions,
+) -> Result<Vec<u8>, EncodeError> {
+    let mut bases = Vec::with_capacity(meshes.len());
+    let mut chunks: Vec<Vec<Part>> = Vec::with_capacity(meshes.len());
+    let mut orders = Vec::new();
+    for (m, pm) in meshes.iter().enumerate() {
+        pm.cursor().map_err(|damage| EncodeError::Damage { mesh: m, damage })?;
+        let places: Vec<u32> =
+            turns.iter().zip(0u32..).filter(|(t, _)| **t as usize == m).map(|(_, k)| k).collect();
+        let parts = encode_mesh(m as u32, pm, &places, options).ok_or(EncodeError::Inconsistent(m))?;
+        bases.push(parts.base);
+        chunks.push(parts.splits);
+        orders.extend(parts.order);
+    }
+    let mut all = bases;
+    if !scene.is_empty() {
+        all.push(part(ChunkType::SCENE, false, u32::MAX, scene.len() as u64, scene.to_vec()));
+    }
+    all.extend(interleave(chunks));
+    all.extend(orders);
+    let mut directory =
+        Directory { meshes: meshes.len() as u32, chunks: all.iter().map(|p| p.chunk).collect() };
+    let mut out = directory.write();
+    out.reserve_exact(all.iter().map(|p| p.bytes.len()).sum());
+    all.iter().for_each(|p| out.extend_from_slice(&p.bytes));
+    Ok(out)
+}
+
+/// The chunks of all meshes, each mesh's in its order, by where they belong in the common order.
+fn interleave(meshes: Vec<Vec<Part>>) -> Vec<Part> {
+    let mut keyed = Vec::new();
+    for (m, parts) in meshes.into_iter().enumerate() {
+        let mut latest = f64::NEG_INFINITY;
+        for p in parts {
+            latest = latest.max(p.turn);
+            keyed.push((latest, m, p));
+        }
+    }
+    keyed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    keyed.into_iter().map(|(_, _, p)| p).collect()
+}
+
+struct MeshParts {
+    base: Part,
+    splits: Vec<Part>,
+    order: Option<Part>,
+}
+
+fn encode_mesh(
+    m: u32,
+    source: &ProgressiveMesh,
+    turns: &[u32],
+    options: &EncodeOptions,
+) -> Option<MeshParts> {
+    let plan = Plan::new(source);
+    let mut pm = source.reordered(&plan.order).ok()?;
+    let tips = input_order::tips(&pm);
+    input_order::turn(&mut pm, &tips, true);
+    let lattices: Vec<Lattice> = Vec::new();
+    let head = MeshHead {
+        splits: pm.splits.len() as u32,
+        base_vertices: pm.base_vertices() as u32,
+        base_faces: pm.base_faces.len() as u32,
+        base_wedges: pm.wedges.as_ref().map_or(pm.base_vertices(), |w| w.base_vertex.len()) as u32,
+        wires: pm.wires.len() as u32,
+        double: pm.base_positions.is_f64(),
+        channels: pm.wedges.as_ref().map(|w| w.channels.clone()),
+        materials: !pm.face_material.is_empty(),
+        groups: !pm.face_group.is_empty(),
+        lattices,
+        levels: plan.levels.clone(),
+        quantisation_error: 0.0,
+    };
+    let mut base = part(ChunkType::BASE, true, m, base::raw_bytes(&head), base::write(&head, &mut pm)?);
+    base.chunk.count = head.base_vertices;
+    let starts = starts(&pm, &pm.rows_of_splits(), &plan.pieces);
+    let one = |(piece, ends): (&Piece, &[Counts])| {
+        let (first, end) = (ends[0], ends[1]);
+        let (bytes, _) = splits::write(&head, &pm, first, piece.count)?;
+        let mut p = part(ChunkType::SPLITS, true, m, raw_bytes(&head, first, end), bytes);
+        let range = first.split..end.split;
+        p.chunk.first = first.split as u32;
+        p.chunk.count = piece.count as u32;
+        p.chunk.first_face = first.face as u32;
+        (p.chunk.band, p.chunk.subtree) = (piece.band, piece.subtree);
+        p.chunk.error =
+            pm.splits.error[range.clone()].iter().map(|&e| splits::rounded_error(e)).fold(0.0, f32::max);
+        let sum: f64 =
+            plan.order[range].iter().map(|&i| turns.get(i as usize).map_or(0.0, |&t| t as f64)).sum();
+        p.turn = sum / piece.count.max(1) as f64;
+        Some(p)
+    };
+    let jobs: Vec<_> = plan.pieces.iter().zip(starts.windows(2)).collect();
+    let splits: Option<Vec<Part>> = super::each(jobs, one).into_iter().collect();
+    let order = match &pm.order {
+        Some(order) if !options.any_order => {
+            let raw = input_order::raw_bytes(order, tips.len());
+            let bytes = input_order::write(&pm, tips, order)?;
+            Some(part(ChunkType::ORDER, false, m, raw, bytes))
+        }
+        _ => None,
+    };
+    Some(MeshParts { base, splits: splits?, order })
+}
+
+/// Where the arrays stand at the start of every piece, and at the end.
+fn starts(pm: &ProgressiveMesh, rows: &[RowsOf], pieces: &[Piece]) -> Vec<Counts> {
+    let base_wedges = pm.wedges.as_ref().map_or(pm.base_vertices(), |w| w.base_vertex.len());
+    let mut at =
+        Counts { face: pm.base_faces.len(), wedge: base_wedges, row: base_wedges, ..Default::default() };
+    let mut all = vec![at];
+    for p in pieces {
+        let range = at.split..at.split + p.count;
+        for (code, r) in pm.splits.code[range.clone()].iter().zip(&rows[range]) {
+            at.face += 1 + code.two_faces() as usize;
+            at.moved += code.moves() as usize;
+            if pm.wedges.is_some() {
+                at.wedge += r.new as usize;
+                at.row += (r.new + r.changed) as usize;
+                at.explicit = r.explicit.end;
+            }
+        }
+        at.split += p.count;
+        all.push(at);
+    }
+    all
+}
+
+/// What [`splits::SplitBlock::bytes`] says of these splits.
+fn raw_bytes(head: &MeshHead, a: Counts, b: Counts) -> u64 {
+    let splits = (b.split - a.split) as u64;
+    let point = if head.double { 24 } else { 12 };
+    let rows = if head.channels.is_some() { (b.row - a.row) as u64 } else { 0 };
+    splits * (18 + point)
+        + (b.moved - a.moved) as u64 * point
+        + rows * (8 + 4 * head.stride() as u64)
+        + 4 * (b.explicit - a.explicit) as u64
+        + 4 * (b.face - a.face) as u64 * (head.materials as u64 + head.groups as u64)
+}
