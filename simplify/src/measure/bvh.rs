@@ -64,7 +64,8 @@ pub(super) fn order(centres: Vec<[f32; 3]>) -> Vec<u32> {
 
 /// Orders `items`, which lie below one node whose children take `span` each.
 fn split(items: &mut [Item], span: usize) {
-    if span == 0 || items.len() <= 1 {
+    // Among the triangles of one leaf any order will do.
+    if span <= 1 && items.len() <= 4 {
         return;
     }
     if items.len() <= span {
@@ -88,9 +89,16 @@ fn split(items: &mut [Item], span: usize) {
         2
     };
     // A total order, so that the halves do not depend on how the selection goes about it.
-    items.select_nth_unstable_by(at, |x, y| x.at[axis].total_cmp(&y.at[axis]).then(x.id.cmp(&y.id)));
+    items.select_nth_unstable_by_key(at, |i| u64::from(ordered(i.at[axis])) << 32 | u64::from(i.id));
     let (left, right) = items.split_at_mut(at);
     crate::parallel::join(left.len() >= PARALLEL, || split(left, span), || split(right, span));
+}
+
+/// A number whose order is that of `x`.
+#[inline]
+fn ordered(x: f32) -> u32 {
+    let bits = x.to_bits();
+    bits ^ ((bits as i32 >> 31) as u32 | 1 << 31)
 }
 
 impl Bvh {

@@ -3,7 +3,7 @@
 use super::bvh::{Node, down, up};
 use super::surface::Surface;
 use super::triangle::{self, Foot};
-use glam::{DVec3, Vec4};
+use glam::{BVec4A, DVec3, Vec4};
 
 /// The point of a surface closest to a given one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,7 +109,8 @@ struct Waiting {
 /// bits that carry the lane: 2^-20 covers them.
 #[inline]
 fn ceiling(d2: f64) -> f32 {
-    (d2 * (1.0 + 1e-6)) as f32 * (1.0 + f32::EPSILON) + f32::MIN_POSITIVE
+    // Finite, so that children that are missing, at infinity, never are within it.
+    ((d2 * (1.0 + 1e-6)) as f32 * (1.0 + f32::EPSILON) + f32::MIN_POSITIVE).min(f32::MAX)
 }
 
 impl Surface {
@@ -136,7 +137,7 @@ impl Surface {
         };
         if near(p) {
             let around = Around::new(p);
-            self.descend(d2, |n, limit| keys(around.squared(n), limit), visit);
+            self.descend(d2, |n| around.squared(n), visit);
         } else {
             self.descend_far(p, d2, visit);
         }
@@ -155,7 +156,7 @@ impl Surface {
         };
         if near(p) {
             let around = Around::new(p);
-            self.descend(limit, |n, limit| keys(around.squared(n), limit), visit);
+            self.descend(limit, |n| around.squared(n), visit);
         } else {
             self.descend_far(p, limit, visit);
         }
@@ -171,11 +172,11 @@ impl Surface {
         let around = points.map(Around::new);
         let mut found = None;
         let mut least = d2;
-        let keys = |n: &Node, limit| {
+        let squared = |n: &Node| {
             let [x, y, z] = [0, 1, 2].map(|k| around[k].squared(n));
-            keys(x.max(y).max(z), limit)
+            x.max(y).max(z)
         };
-        self.descend(d2, keys, |t| {
+        self.descend(d2, squared, |t| {
             let greatest = greatest(self.corners(t as usize), points, least);
             if greatest < least {
                 (least, found) = (greatest, Some(t));
@@ -185,10 +186,10 @@ impl Surface {
         found.map(|t| (t, least))
     }
 
-    /// Visits the triangles below all nodes that `keys` (squared distances of the children) leaves below the limit, near ones first; `visit`
-    /// returns the new limit.
+    /// Visits the triangles below all nodes whose `squared` distances (of the children) are within the limit, near ones first; `visit` returns
+    /// the new limit.
     #[inline]
-    fn descend(&self, d2: f64, keys: impl Fn(&Node, f32) -> [u32; 4], mut visit: impl FnMut(u32) -> f64) {
+    fn descend(&self, d2: f64, squared: impl Fn(&Node) -> Vec4, mut visit: impl FnMut(u32) -> f64) {
         let bvh = &self.bvh;
         let mut limit = ceiling(d2);
         let mut stack = [Waiting::default(); STACK];
@@ -196,17 +197,31 @@ impl Surface {
         let mut level = bvh.base.len() - 1;
         let mut node = bvh.base[level];
         loop {
-            let mut keys = keys(&bvh.nodes[node as usize], limit);
+            let d2 = squared(&bvh.nodes[node as usize]);
             let first = 4 * (node - bvh.base[level]);
-            sort(&mut keys);
-            if level == 0 {
+            let within = d2.cmple(Vec4::splat(limit));
+            let mask = within.bitmask();
+            if mask & mask.wrapping_sub(1) == 0 && mask != 0 {
+                // A single child, as in most cases.
+                let child = first + mask.trailing_zeros();
+                if level > 0 {
+                    level -= 1;
+                    node = bvh.base[level] + child;
+                    continue;
+                }
+                limit = ceiling(visit(child));
+            } else if mask == 0 {
+                // Nothing here.
+            } else if level == 0 {
+                let keys = keys(d2, within);
                 for key in keys {
                     if key == NOT || f32::from_bits(key & !3) > limit {
                         break;
                     }
                     limit = ceiling(visit(first + (key & 3)));
                 }
-            } else if keys[0] != NOT {
+            } else {
+                let keys = keys(d2, within);
                 let below = bvh.base[level - 1] + first;
                 for &key in keys[1..].iter().rev().filter(|&&k| k != NOT) {
                     let d2 = f32::from_bits(key & !3);
@@ -310,17 +325,17 @@ impl Around {
 /// The key of a child that is out of the question.
 const NOT: u32 = u32::MAX;
 
-/// Squared distances as ordered bits with the lane in the lowest two; [`NOT`] for those beyond `limit`.
+/// Squared distances as ordered bits with the lane in the lowest two, least first; [`NOT`] for those that are not within the limit.
 #[inline]
-fn keys(d2: Vec4, limit: f32) -> [u32; 4] {
-    let d2 = d2.to_array();
-    std::array::from_fn(|lane| {
-        if d2[lane] <= limit && d2[lane] < f32::INFINITY {
-            d2[lane].to_bits() & !3 | lane as u32
-        } else {
-            NOT
-        }
-    })
+fn keys(d2: Vec4, within: BVec4A) -> [u32; 4] {
+    let all = Vec4::splat(f32::from_bits(NOT));
+    let mut keys = Vec4::select(within, d2, all).to_array().map(f32::to_bits);
+    for (lane, key) in keys.iter_mut().enumerate() {
+        // NOT stays as it is: it is compared as a number from here on.
+        *key = if *key == NOT { NOT } else { *key & !3 | lane as u32 };
+    }
+    sort(&mut keys);
+    keys
 }
 
 /// Sorts four numbers.
