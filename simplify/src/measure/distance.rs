@@ -16,7 +16,8 @@ use glam::DVec3;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DistanceOptions {
-    /// Area samples on each side; at least 1. Default: 300,000, with which mean and rms repeat within 0.1 % from seed to seed.
+    /// Area samples on each side; at least 1. Default: 300,000, with which mean and rms of bunny and fandisk against their
+    /// tenth repeat within 0.2 % from seed to seed.
     pub samples: usize,
     /// Another seed takes other samples. Default: 1.
     pub seed: u64,
