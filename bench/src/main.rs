@@ -1,0 +1,164 @@
+//! progmesh beside its peers. `bench/run` is the way in: it installs the peers, builds this program and calls it.
+
+mod child;
+mod lines;
+mod machine;
+mod measures;
+mod meshes;
+mod one;
+mod page;
+mod plan;
+mod plot;
+mod raw;
+mod results;
+mod run;
+mod stats;
+mod table;
+mod tools;
+
+use anyhow::{Context, Result, ensure};
+use clap::{Args, Parser, Subcommand};
+use plan::{Plan, Wanted};
+use run::Out;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use tools::Places;
+
+#[derive(Parser)]
+#[command(name = "progmesh-bench", about = "progmesh beside its peers: time, memory and measured error")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Measure, then write the tables and the report.
+    Run(Run),
+    /// Write the tables and the report of what was measured before.
+    Report(Report),
+    /// One run of a tool of this process: raw mesh in, raw mesh out, a line of JSON on standard output.
+    One(One),
+}
+
+#[derive(Args)]
+struct Where {
+    /// Folder for results. Default: bench/out.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Folder of the peers. Default: bench/.env.
+    #[arg(long)]
+    env: Option<PathBuf>,
+}
+
+#[derive(Args)]
+struct Report {
+    /// Also put the summary into README.md and the plot into docs/.
+    #[arg(long)]
+    publish: bool,
+    #[command(flatten)]
+    places: Where,
+}
+
+#[derive(Args)]
+struct Run {
+    /// Fewer meshes and ratios: minutes.
+    #[arg(long, conflicts_with_all = ["full", "data"])]
+    quick: bool,
+    /// All meshes at all ratios. The default.
+    #[arg(long)]
+    full: bool,
+    /// The meshes of this folder, instead of those of packages and the generated ones.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Only these meshes, tools (or ours, peers) and ratios (10%).
+    #[arg(long, value_delimiter = ',', value_name = "WORDS")]
+    only: Vec<String>,
+    /// Runs of each, of which the median counts [default: 5].
+    #[arg(long, value_name = "N")]
+    repeat: Option<usize>,
+    /// Also put the summary into README.md and the plot into docs/.
+    #[arg(long)]
+    publish: bool,
+    /// Keep the rows of an earlier run that are of the same mesh, tool and version.
+    #[arg(long)]
+    resume: bool,
+    #[command(flatten)]
+    places: Where,
+}
+
+#[derive(Args)]
+struct One {
+    tool: String,
+    input: PathBuf,
+    output: PathBuf,
+    /// Triangles to leave.
+    target: usize,
+    /// What an earlier run searched for.
+    parameter: Option<f64>,
+}
+
+impl Where {
+    fn places(&self) -> (Places, Out) {
+        let bench = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+        let env = self.env.clone().unwrap_or_else(|| bench.join(".env"));
+        let folder = self.out.clone().unwrap_or_else(|| bench.join("out"));
+        (Places { env, bench }, Out { folder })
+    }
+}
+
+fn main() -> ExitCode {
+    match command(Cli::parse().command) {
+        Ok(code) => code,
+        Err(e) => {
+            eprintln!("error: {e:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn command(command: Command) -> Result<ExitCode> {
+    match command {
+        Command::Run(r) => {
+            let (places, out) = r.places.places();
+            let wanted = Wanted { quick: r.quick, data: r.data, only: r.only, repeat: r.repeat };
+            run::run(&Plan::new(&wanted, &places.env)?, &places, &out, r.resume)?;
+            report(&places, &out, r.publish)?;
+        }
+        Command::Report(r) => {
+            let (places, out) = r.places.places();
+            report(&places, &out, r.publish)?;
+        }
+        Command::One(o) => {
+            let mesh = raw::Raw::read(&o.input)?;
+            let (result, mut said) = one::run(&o.tool, &mesh, o.target, o.parameter)?;
+            result.write(&o.output)?;
+            said.peak_bytes = progmesh::io::files::peak_bytes();
+            println!("{}", serde_json::to_string(&said)?);
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Writes everything that is made of the results.
+fn report(places: &Places, out: &Out, publish: bool) -> Result<()> {
+    let all = results::Results::of(lines::read(&out.results())?);
+    ensure!(!all.rows.is_empty(), "{}: nothing was measured", out.results().display());
+    put(&out.folder.join("table.md"), &table::markdown(&all))?;
+    put(&out.folder.join("report.html"), &page::html(&all, &[]))?;
+    if publish {
+        let root = places.bench.join("..");
+        let readme = root.join("README.md");
+        let text = std::fs::read_to_string(&readme).with_context(|| readme.display().to_string())?;
+        let text = table::spliced(&text, &table::summary(&all)).context("README.md has no marks for the table")?;
+        put(&root.join("docs/bench.svg"), &page::picture(&all))?;
+        put(&readme, &text)?;
+    }
+    Ok(())
+}
+
+fn put(path: &Path, text: &str) -> Result<()> {
+    std::fs::write(path, text).with_context(|| path.display().to_string())?;
+    eprintln!("{}", path.display());
+    Ok(())
+}
