@@ -72,8 +72,12 @@ fn picture() -> BTreeMap<String, BTreeSet<String>> {
 #[test]
 fn the_picture_is_what_the_manifests_say() {
     let picture = picture();
-    let packages: BTreeSet<String> =
-        LIBRARIES.iter().chain(&["bench"]).map(|l| format!("progmesh-{l}")).chain(["progmesh".into()]).collect();
+    let packages: BTreeSet<String> = LIBRARIES
+        .iter()
+        .chain(&["bench"])
+        .map(|l| format!("progmesh-{l}"))
+        .chain(["progmesh".into()])
+        .collect();
     assert_eq!(picture.keys().cloned().collect::<BTreeSet<_>>(), packages);
     for (package, on) in &picture {
         assert_eq!(&named(&manifest(package), "[dependencies]"), on, "{package}");

@@ -113,9 +113,8 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Line>> {
         text => text.with_context(|| path.display().to_string())?,
     };
     let whole = text.rsplit_once('\n').map_or("", |t| t.0);
-    let parse = |(i, line)| {
-        serde_json::from_str(line).with_context(|| format!("{}, line {}", path.display(), i + 1))
-    };
+    let parse =
+        |(i, line)| serde_json::from_str(line).with_context(|| format!("{}, line {}", path.display(), i + 1));
     whole.lines().enumerate().filter(|l| !l.1.is_empty()).map(parse).collect()
 }
 

@@ -27,7 +27,8 @@ impl Machine {
             let text = output(Path::new(program), &["--version"]).unwrap_or_default();
             text.lines().next().unwrap_or_default().to_string()
         };
-        let system = field(&file("/etc/os-release"), "PRETTY_NAME", '=').unwrap_or(std::env::consts::OS.into());
+        let system =
+            field(&file("/etc/os-release"), "PRETTY_NAME", '=').unwrap_or(std::env::consts::OS.into());
         let kernel = file("/proc/sys/kernel/osrelease");
         let memory = field(&file("/proc/meminfo"), "MemTotal", ':');
         Machine {
@@ -45,8 +46,14 @@ impl Machine {
     /// In words, one fact an entry.
     pub(crate) fn words(&self) -> Vec<(&'static str, String)> {
         let mut words = vec![("processor", self.cpu.clone()), ("cores", self.cores.to_string())];
-        words.extend(self.memory_bytes.map(|m| ("memory", format!("{:.1} GiB", m as f64 / (1u64 << 30) as f64))));
-        words.extend([("system", self.system.clone()), ("Rust", self.rustc.clone()), ("C++", self.cxx.clone())]);
+        words.extend(
+            self.memory_bytes.map(|m| ("memory", format!("{:.1} GiB", m as f64 / (1u64 << 30) as f64))),
+        );
+        words.extend([
+            ("system", self.system.clone()),
+            ("Rust", self.rustc.clone()),
+            ("C++", self.cxx.clone()),
+        ]);
         words.push(("Python", self.python.clone()));
         words.extend(self.load.map(|l| ("load before the run", format!("{l:.2}"))));
         words.retain(|w| !w.1.is_empty());

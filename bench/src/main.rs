@@ -1,6 +1,9 @@
 //! progmesh beside its peers. `bench/run` is the way in: it installs the peers, builds this program and calls it.
 
+mod check;
 mod child;
+mod instructions;
+mod kernels;
 mod lines;
 mod machine;
 mod measures;
@@ -15,6 +18,7 @@ mod run;
 mod stats;
 mod table;
 mod tools;
+mod validate;
 
 use anyhow::{Context, Result, ensure};
 use clap::{Args, Parser, Subcommand};
@@ -37,6 +41,17 @@ enum Command {
     Run(Run),
     /// Write the tables and the report of what was measured before.
     Report(Report),
+    /// Let MeshLab compute our published mean and rms again; exit code 1 if they differ.
+    Check(Check),
+    /// Make every GLB that the documents mention, and show it to the glTF validator; exit code 1 if one has errors.
+    Validate(Validate),
+    /// Count instructions of kernels, beside those of the last count; exit code 1 if one grew by 2 %.
+    Instructions(Where),
+    /// One run of a kernel.
+    Kernel {
+        /// Which.
+        name: String,
+    },
     /// One run of a tool of this process: raw mesh in, raw mesh out, a line of JSON on standard output.
     One(One),
 }
@@ -88,6 +103,23 @@ struct Run {
 }
 
 #[derive(Args)]
+struct Check {
+    /// Only these ratios (10%).
+    #[arg(long, value_delimiter = ',', value_name = "RATIOS")]
+    only: Vec<String>,
+    #[command(flatten)]
+    places: Where,
+}
+
+#[derive(Args)]
+struct Validate {
+    /// The program progmesh.
+    program: PathBuf,
+    #[command(flatten)]
+    places: Where,
+}
+
+#[derive(Args)]
 struct One {
     tool: String,
     input: PathBuf,
@@ -129,6 +161,23 @@ fn command(command: Command) -> Result<ExitCode> {
             let (places, out) = r.places.places();
             report(&places, &out, r.publish)?;
         }
+        Command::Check(c) => {
+            let (places, out) = c.places.places();
+            let ratios = c.only.iter().map(|w| plan::ratio(w)).collect::<Result<Vec<f64>>>()?;
+            let text = std::fs::read_to_string(places.bench.join(PUBLISHED)).unwrap_or("[]".into());
+            let published: Vec<check::Published> = serde_json::from_str(&text).context(PUBLISHED)?;
+            return Ok(good(check::check(&places, &published, &ratios, &out.folder)?));
+        }
+        Command::Validate(v) => {
+            let (places, out) = v.places.places();
+            return Ok(good(validate::validate(&places, &v.program, &out.folder.join("docs"))?));
+        }
+        Command::Instructions(w) => {
+            let out = w.places().1;
+            std::fs::create_dir_all(&out.folder)?;
+            return Ok(good(instructions::count(&out.folder.join("instructions.json"), &out.folder)?));
+        }
+        Command::Kernel { name } => println!("{}", instructions::run_kernel(&name)?),
         Command::One(o) => {
             let mesh = raw::Raw::read(&o.input)?;
             let (result, mut said) = one::run(&o.tool, &mesh, o.target, o.parameter)?;
@@ -138,6 +187,13 @@ fn command(command: Command) -> Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What was published of our own results, in `bench/`.
+const PUBLISHED: &str = "published.json";
+
+fn good(all: bool) -> ExitCode {
+    if all { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// Writes everything that is made of the results.
@@ -150,7 +206,11 @@ fn report(places: &Places, out: &Out, publish: bool) -> Result<()> {
         let root = places.bench.join("..");
         let readme = root.join("README.md");
         let text = std::fs::read_to_string(&readme).with_context(|| readme.display().to_string())?;
-        let text = table::spliced(&text, &table::summary(&all)).context("README.md has no marks for the table")?;
+        let text =
+            table::spliced(&text, &table::summary(&all)).context("README.md has no marks for the table")?;
+        let shown = table::shown(&all);
+        let published = check::published(&all, &table::SHOWN_RATIOS, &shown);
+        put(&places.bench.join(PUBLISHED), &(serde_json::to_string_pretty(&published)? + "\n"))?;
         put(&root.join("docs/bench.svg"), &page::picture(&all))?;
         put(&readme, &text)?;
     }

@@ -100,7 +100,13 @@ fn triangles_error(all: &Results, mesh: &str) -> Panel {
     }
 }
 
-fn points(all: &Results, mesh: &str, tool: &Tool, threads: usize, x: fn(&crate::lines::Row) -> f64) -> Vec<Point> {
+fn points(
+    all: &Results,
+    mesh: &str,
+    tool: &Tool,
+    threads: usize,
+    x: fn(&crate::lines::Row) -> f64,
+) -> Vec<Point> {
     let of = |ratio: f64| {
         let row = all.row(mesh, ratio, tool.id, threads)?;
         let error = 1e5 * row.rms()?;

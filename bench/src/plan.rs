@@ -55,9 +55,8 @@ impl Plan {
     fn only(&mut self, words: &[String]) -> Result<()> {
         let (mut meshes, mut tools, mut ratios) = (vec![], vec![], vec![]);
         for word in words {
-            if let Some(per_cent) = word.strip_suffix('%').and_then(|w| w.trim().parse::<f64>().ok()) {
-                ensure!(per_cent > 0.0 && per_cent <= 100.0, "{word}: a ratio is above 0 and at most 100 %");
-                ratios.push(per_cent / 100.0);
+            if word.ends_with('%') {
+                ratios.push(ratio(word)?);
             } else if let Some(m) = self.meshes.iter().find(|m| m.name == *word) {
                 meshes.push(m.clone());
             } else if word == "ours" || word == "peers" {
@@ -99,6 +98,15 @@ impl Plan {
             }
         }
         all
+    }
+}
+
+/// A ratio written as `10%`.
+pub(crate) fn ratio(word: &str) -> Result<f64> {
+    let number = word.strip_suffix('%').and_then(|w| w.trim().parse::<f64>().ok());
+    match number {
+        Some(n) if n > 0.0 && n <= 100.0 => Ok(n / 100.0),
+        _ => bail!("{word}: a ratio is written 10%, above 0 and at most 100 %"),
     }
 }
 

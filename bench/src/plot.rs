@@ -164,8 +164,12 @@ fn draw(panel: &Panel, out: &mut String) {
         let at = round(HEIGHT - y.at(value));
         let _ = writeln!(out, "<path d=\"M0 {at}h{WIDTH}\" stroke=\"#e4e4e4\"/>");
         if number {
-            let _ =
-                writeln!(out, "<text x=\"-6\" y=\"{}\" text-anchor=\"end\">{}</text>", at + 4.0, short(value));
+            let _ = writeln!(
+                out,
+                "<text x=\"-6\" y=\"{}\" text-anchor=\"end\">{}</text>",
+                at + 4.0,
+                short(value)
+            );
         }
     }
     let _ = writeln!(
@@ -253,7 +257,8 @@ mod tests {
 
     fn series(label: &str, points: &[[f64; 2]]) -> Series {
         let style = Style { colour: "#123456", shape: Shape::Square, hollow: false, width: 1.0 };
-        let point = |p: &[f64; 2]| Point { x: p[0], y: p[1], title: format!("<{}>", p[0]), note: String::new() };
+        let point =
+            |p: &[f64; 2]| Point { x: p[0], y: p[1], title: format!("<{}>", p[0]), note: String::new() };
         Series { label: label.into(), style, points: points.iter().map(point).collect() }
     }
 
@@ -284,7 +289,12 @@ mod tests {
     fn points_that_no_logarithm_has_are_left_out() {
         let bad = series("bad", &[[0.0, 1.0], [1.0, f64::NAN], [-1.0, 1.0], [1.0, f64::INFINITY]]);
         let text = svg(&[panel(vec![bad, series("good", &[[1.0, 2.0], [10.0, 0.5]])])]);
-        assert!(!text.contains(">bad<") && text.contains(">good<") && !text.contains("NaN") && !text.contains("inf"));
+        assert!(
+            !text.contains(">bad<")
+                && text.contains(">good<")
+                && !text.contains("NaN")
+                && !text.contains("inf")
+        );
         // Two marks and the one of the legend.
         assert_eq!(text.matches("h7.6v7.6").count(), 3);
         assert_eq!(svg(&[panel(vec![])]).matches("<circle").count(), 0);

@@ -84,7 +84,8 @@ impl Results {
             for peer in self.rows.iter().filter(same).filter(|r| !is_ours(r)) {
                 let Some(point) = peer.point() else { continue };
                 let beats = |r: &&Row| {
-                    r.point().is_some_and(|p| p[0] <= point[0] && p[1] <= point[1]) && r.triangles <= peer.triangles
+                    r.point().is_some_and(|p| p[0] <= point[0] && p[1] <= point[1])
+                        && r.triangles <= peer.triangles
                 };
                 let own = self.rows.iter().filter(same).filter(|r| is_ours(r) && r.threads <= threads);
                 let answer = own.filter(beats).min_by(|a, b| a.call.median.total_cmp(&b.call.median));
@@ -147,7 +148,8 @@ pub(crate) mod tests {
     /// One mesh, two ratios: a peer better in both at 10 %, one slower and better.
     pub(crate) fn results() -> Results {
         let mesh = MeshLine { mesh: "bunny".into(), triangles: 1000, vertices: 502, ..MeshLine::default() };
-        let gone = MeshLine { mesh: "dragon".into(), missing: Some("no <npm>".into()), ..MeshLine::default() };
+        let gone =
+            MeshLine { mesh: "dragon".into(), missing: Some("no <npm>".into()), ..MeshLine::default() };
         let tool = |id: &str, missing: Option<&str>| ToolLine {
             tool: id.into(),
             version: missing.is_none().then(|| "1".into()),

@@ -1,6 +1,7 @@
 //! The results in Markdown.
 
-use crate::lines::Row;
+use crate::lines::{MeshLine, Row};
+use crate::measures::Measures;
 use crate::results::{Duel, Results, label, name};
 use crate::stats::{Standing, front};
 use crate::tools::Tool;
@@ -12,7 +13,7 @@ const END: &str = "<!-- to here -->\n";
 
 /// What the README shows: at most so many meshes, at these ratios.
 const SHOWN_MESHES: usize = 4;
-const SHOWN_RATIOS: [f64; 2] = [0.1, 0.01];
+pub(crate) const SHOWN_RATIOS: [f64; 2] = [0.1, 0.01];
 
 /// Everything: `table.md`.
 pub(crate) fn markdown(all: &Results) -> String {
@@ -54,7 +55,9 @@ pub(crate) fn definitions() -> String {
     "rms: root mean square distance between result and original, the worse of both directions, in 1e-5 of the \
      original's diagonal, over 300,000 area samples a side; max: the largest found. Seconds: the call alone, arrays in memory to arrays in \
      memory, the median of at least 5 processes in which the tools took turns; MeshLab and CGAL without filling their own structures, \
-     ours with it. Process: from start to end, with reading and writing a plain binary file. Peers have no setting for threads and \
+     ours with it. Arrays: with that. Normals: rms angle between them, degrees. Turned: triangles that look the other way. Cuts itself: pairs of \
+     triangles. Shape: mean of longest edge over shortest altitude (1.15 is best). Topology: components, border loops, handles (? where it is no \
+     manifold), non-manifold edges. Process: from start to end, with reading and writing a plain binary file. Peers have no setting for threads and \
      were free to use all cores.\n"
         .into()
 }
@@ -66,8 +69,7 @@ fn group(all: &Results, mesh: &str, ratio: f64) -> String {
         .into_iter()
         .filter_map(|(t, n)| Some((t, n, all.row(mesh, ratio, t.id, n)?)))
         .collect();
-    let points: Vec<[f64; 2]> =
-        rows.iter().map(|r| r.2.point().unwrap_or([f64::INFINITY; 2])).collect();
+    let points: Vec<[f64; 2]> = rows.iter().map(|r| r.2.point().unwrap_or([f64::INFINITY; 2])).collect();
     let best = front(&points);
     let cells = rows.iter().zip(best).map(|((tool, threads, row), best)| {
         let label = label(tool, *threads);
@@ -84,6 +86,11 @@ fn group(all: &Results, mesh: &str, ratio: f64) -> String {
             of(m.worse.mean),
             of(m.worse.p99),
             of(m.worse.max),
+            format!("{:.1}", m.normal_rms),
+            m.turned.to_string(),
+            m.self_intersections.to_string(),
+            figures(m.shape_mean),
+            topology(m),
             seconds(row.call.median),
             format!("{:.0} %", 100.0 * crate::stats::spread(&row.call.all)),
             seconds(row.arrays.median),
@@ -93,11 +100,34 @@ fn group(all: &Results, mesh: &str, ratio: f64) -> String {
         ]
     });
     let head = [
-        "tool", "triangles", "rms", "mean", "99 %", "max", "seconds", "+-", "arrays", "process", "cores used", "MiB",
+        "tool",
+        "triangles",
+        "rms",
+        "mean",
+        "99 %",
+        "max",
+        "normals",
+        "turned",
+        "cuts itself",
+        "shape",
+        "topology",
+        "seconds",
+        "+-",
+        "arrays",
+        "process",
+        "cores used",
+        "MiB",
     ];
     let mut out = table(&head, cells);
     out += "\nBold: no other is at least as good in seconds and rms and better in one.\n";
     out
+}
+
+/// Components, border loops, handles, non-manifold edges.
+fn topology(m: &Measures) -> String {
+    let t = &m.topology;
+    let genus = t.genus.map_or("?".into(), |g| g.to_string());
+    format!("{} {} {genus} {}", t.components, t.border_loops, t.non_manifold_edges)
 }
 
 /// Counts of wins and losses, then every loss.
@@ -134,7 +164,8 @@ pub(crate) fn losses(all: &Results) -> String {
             out += "None.\n";
             continue;
         }
-        let head = ["mesh", "kept", "peer", "peer: rms, seconds", "ours: rms, seconds", "threads", "answered by"];
+        let head =
+            ["mesh", "kept", "peer", "peer: rms, seconds", "ours: rms, seconds", "threads", "answered by"];
         out += &table(&head, lost.into_iter());
     }
     out += "\nAnswered by: the fastest of our methods, with no more threads, that is at least as fast and as exact as that peer \
@@ -160,9 +191,14 @@ fn duel(d: &Duel<'_>) -> Vec<String> {
     ]
 }
 
+/// The meshes of the README's part.
+pub(crate) fn shown(all: &Results) -> Vec<&MeshLine> {
+    all.measured().take(SHOWN_MESHES).collect()
+}
+
 /// The README's part, without the marks: rms and seconds of every tool on a few meshes.
 pub(crate) fn summary(all: &Results) -> String {
-    let meshes: Vec<_> = all.measured().take(SHOWN_MESHES).collect();
+    let meshes = shown(all);
     let mut columns = Vec::new();
     for m in &meshes {
         columns.extend(SHOWN_RATIOS.iter().filter(|r| all.ratios(&m.mesh).contains(r)).map(|&r| (*m, r)));
@@ -186,12 +222,18 @@ pub(crate) fn summary(all: &Results) -> String {
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let mut out = table(&head, rows);
     out += "\n\\* not within 1 % of the triangles asked for.\n\n";
-    let machine: Vec<String> = all.machine.words().into_iter().take(2).map(|(k, v)| format!("{k} {v}")).collect();
+    let machine: Vec<String> =
+        all.machine.words().into_iter().take(2).map(|(k, v)| format!("{k} {v}")).collect();
     let version = |t: &crate::lines::ToolLine| Some(format!("{} {}", name(&t.tool), t.version.as_ref()?));
     let versions: Vec<String> = all.tools.iter().filter(|t| peer(&t.tool)).filter_map(version).collect();
     let _ = writeln!(out, "{}. {}.", machine.join(", "), versions.join(", "));
     for t in all.tools.iter().filter(|t| t.missing.is_some()) {
-        let _ = writeln!(out, "\n{} was not measured: {}.", name(&t.tool), t.missing.as_deref().unwrap_or_default());
+        let _ = writeln!(
+            out,
+            "\n{} was not measured: {}.",
+            name(&t.tool),
+            t.missing.as_deref().unwrap_or_default()
+        );
     }
     out + "\n" + &verdict(all)
 }
@@ -296,7 +338,10 @@ mod tests {
 
     #[test]
     fn numbers_have_three_figures() {
-        assert_eq!([0.0, 20.31, 123.4, 1234.6, 0.012345].map(figures), ["0", "20.3", "123", "1235", "0.0123"]);
+        assert_eq!(
+            [0.0, 20.31, 123.4, 1234.6, 0.012345].map(figures),
+            ["0", "20.3", "123", "1235", "0.0123"]
+        );
         assert_eq!(figures(1.234e-9), "1.23e-9");
         assert_eq!([0.00123, 0.0213, 1.0].map(seconds), ["0.0012", "0.0213", "1.00"]);
         assert_eq!([0.1, 0.025, 1.0].map(per_cent), ["10 %", "2.5 %", "100 %"]);

@@ -129,7 +129,8 @@ mod tests {
     fn the_version_is_that_of_the_lock_file() {
         let places = Places { env: "/nowhere".into(), bench: env!("CARGO_MANIFEST_DIR").into() };
         assert!(places.version(find("meshopt").unwrap()).unwrap().starts_with("0."));
-        let lock = "[[package]]\nname = \"a\"\nversion = \"1.2.3\"\n\n[[package]]\nname = \"ab\"\nversion = \"4\"\n";
+        let lock =
+            "[[package]]\nname = \"a\"\nversion = \"1.2.3\"\n\n[[package]]\nname = \"ab\"\nversion = \"4\"\n";
         assert_eq!(locked(lock, "a").as_deref(), Some("1.2.3"));
         assert_eq!(locked(lock, "b"), None);
     }
