@@ -11,6 +11,8 @@ pub(super) struct Corner {
     pub(super) w: f64,
     pub(super) z: f64,
     pub(super) normal: DVec3,
+    /// In the world.
+    pub(super) point: DVec3,
     /// True if the edge to the next corner is one of the face.
     pub(super) edge: bool,
 }
@@ -24,6 +26,7 @@ impl Corner {
             w: at(self.w, to.w),
             z: at(self.z, to.z),
             normal: self.normal.lerp(to.normal, t),
+            point: self.point.lerp(to.point, t),
             edge,
         }
     }
@@ -67,7 +70,7 @@ mod tests {
     use crate::report::Projection;
 
     fn corner(x: f64, y: f64, w: f64) -> Corner {
-        Corner { x, y, w, z: w, normal: DVec3::Z, edge: true }
+        Corner { x, y, w, z: w, normal: DVec3::Z, point: DVec3::ZERO, edge: true }
     }
 
     #[test]

@@ -7,6 +7,7 @@
 //! Not physically based, and no textures: a picture shows shape and material base colours.
 
 mod clip;
+mod colormap;
 mod font;
 mod picture;
 mod raster;
@@ -14,7 +15,8 @@ mod render;
 mod surface;
 mod view;
 
+pub use colormap::{heat_bytes, heat_color};
 pub use picture::Picture;
-pub use render::{Mask, Shading, Style, render, silhouette};
+pub use render::{Mask, Shading, Style, render, render_painted, silhouette};
 pub use surface::{Surface, SurfaceError};
 pub use view::{Projection, View};

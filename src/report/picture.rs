@@ -11,10 +11,10 @@ pub struct Picture {
     rgb: Vec<u8>,
 }
 
-/// Screen pixels that a pixel of a caption's letter takes.
-const LETTER: u32 = 2;
+/// Pixels of a dot of a caption's letters.
+const LETTER: f64 = 2.0;
 /// Pixels from a caption to the picture's edge.
-const MARGIN: u32 = 10;
+const MARGIN: f64 = 10.0;
 
 impl Picture {
     /// A picture of one colour.
@@ -56,11 +56,7 @@ impl Picture {
         let mut out = Picture::new(width, height, color);
         let mut left = 0;
         for p in pictures {
-            for y in 0..p.height as usize {
-                let row = 3 * p.width as usize;
-                let to = 3 * (y * width as usize + left as usize);
-                out.rgb[to..to + row].copy_from_slice(&p.rgb[y * row..(y + 1) * row]);
-            }
+            out.place(p, left, 0);
             left += p.width;
         }
         out
@@ -73,20 +69,49 @@ impl Picture {
         self
     }
 
-    /// Writes digits, commas and the letters of "triangles shown instanced" at the lower left, in the last 28 rows; other characters leave
-    /// a gap.
-    pub fn caption(&mut self, text: &str, color: [u8; 3]) {
-        let top = self.height.saturating_sub(MARGIN + font::HEIGHT * LETTER);
-        for (k, letter) in text.chars().enumerate() {
-            let left = MARGIN + k as u32 * (font::WIDTH + 1) * LETTER;
-            for (row, bits) in (0u32..).zip(font::rows(letter)) {
-                for column in (0..font::WIDTH).filter(|c| bits >> (font::WIDTH - 1 - c) & 1 == 1) {
-                    for (dx, dy) in (0..LETTER * LETTER).map(|i| (i % LETTER, i / LETTER)) {
-                        self.set(left + column * LETTER + dx, top + row * LETTER + dy, color);
-                    }
-                }
+    /// Mixes `color` into a pixel: none of it at 0, nothing else at 1. Nothing happens outside.
+    pub(super) fn blend(&mut self, x: u32, y: u32, color: [u8; 3], part: f64) {
+        if let Some(at) = self.offset(x, y).filter(|_| part > 0.0) {
+            for (old, new) in self.rgb[at..at + 3].iter_mut().zip(color.map(f64::from)) {
+                *old = (*old as f64 + part.min(1.0) * (new - *old as f64)).round() as u8;
             }
         }
+    }
+
+    /// Puts a picture into this one, its upper left corner at (`left`, `top`); what reaches beyond is cut off.
+    pub fn place(&mut self, other: &Picture, left: u32, top: u32) {
+        let columns = other.width.min(self.width.saturating_sub(left)) as usize;
+        for y in 0..other.height.min(self.height.saturating_sub(top)) {
+            let to = 3 * ((top + y) as usize * self.width as usize + left as usize);
+            let from = 3 * (y as usize * other.width as usize);
+            self.rgb[to..to + 3 * columns].copy_from_slice(&other.rgb[from..from + 3 * columns]);
+        }
+    }
+
+    /// Fills the rectangle from (`left`, `top`), as far as it lies inside.
+    pub fn fill(&mut self, [left, top]: [u32; 2], [width, height]: [u32; 2], color: [u8; 3]) {
+        for y in top..top.saturating_add(height).min(self.height) {
+            for x in left..left.saturating_add(width).min(self.width) {
+                self.set(x, y, color);
+            }
+        }
+    }
+
+    /// Writes a line of ASCII, capitals of seven `size` pixels with their upper left corner at (`x`, `y`); other characters become question marks.
+    pub fn write(&mut self, x: f64, y: f64, size: f64, text: &str, color: [u8; 3]) {
+        font::write(self, x, y, size, text, color);
+    }
+
+    /// Pixels across that [`Picture::write`] takes.
+    pub fn text_width(text: &str, size: f64) -> f64 {
+        font::width(text, size)
+    }
+
+    /// Writes a line of ASCII at the lower left.
+    pub fn caption(&mut self, text: &str, color: [u8; 3]) {
+        // Two dots below the base line are for g and the comma.
+        let top = self.height as f64 - MARGIN - font::cap_height(LETTER) - 2.0 * LETTER;
+        self.write(MARGIN, top.max(0.0), LETTER, text, color);
     }
 
     /// The picture as a PNG file; `None` if it has no pixels, which PNG cannot hold.
@@ -117,6 +142,18 @@ mod tests {
     }
 
     #[test]
+    fn what_is_placed_is_cut_at_the_edge() {
+        let mut p = Picture::new(4, 4, [0; 3]);
+        p.place(&Picture::new(3, 3, [7; 3]), 2, 3);
+        p.place(&Picture::new(3, 3, [9; 3]), 9, 9);
+        p.fill([0, 0], [1, 9], [5; 3]);
+        let count = |c: u8| p.rgb.chunks(3).filter(|p| p[0] == c).count();
+        assert_eq!((count(7), count(9), count(5)), (2, 0, 4));
+        p.blend(3, 0, [100; 3], 0.25);
+        assert_eq!(p.pixel(3, 0), Some([25; 3]));
+    }
+
+    #[test]
     fn a_png_holds_the_pixels_and_none_is_no_png() {
         let mut p = Picture::new(40, 40, [200, 100, 50]);
         p.caption("1", [0; 3]);
@@ -125,8 +162,8 @@ mod tests {
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut pixels).unwrap();
         assert_eq!((info.width, info.height, &pixels), (40, 40, &p.rgb));
-        // The 1 has 10 pixels of 2 x 2.
-        assert_eq!(p.rgb.chunks(3).filter(|c| c == &[0; 3]).count(), 40);
+        let inked = p.rgb.chunks(3).filter(|c| c[0] < 100).count();
+        assert!((20..60).contains(&inked), "{inked}");
         assert_eq!(Picture::new(0, 4, [0; 3]).png(), None);
     }
 }

@@ -19,6 +19,8 @@ pub(super) struct Spot {
     /// 1 / w, for what is interpolated in perspective.
     pub(super) iw: f64,
     pub(super) normal: DVec3,
+    /// In the world.
+    pub(super) point: DVec3,
     /// True if the edge to the next corner is to be drawn.
     pub(super) edge: bool,
 }
@@ -29,6 +31,8 @@ pub(super) struct Fragment {
     pub(super) near: f32,
     /// Interpolated, not of unit length.
     pub(super) normal: DVec3,
+    /// The point of the surface, in the world.
+    pub(super) point: DVec3,
     /// Distance to the nearest edge that is to be drawn, pixels.
     pub(super) to_edge: f64,
 }
@@ -98,10 +102,13 @@ pub(super) fn fill(corners: [Spot; 3], width: u32, height: u32, mut visit: impl 
             for (s, v) in sides.iter().zip(value).filter(|(s, _)| s.length > 0.0) {
                 to_edge = to_edge.min(v as f64 / s.length);
             }
+            let all = wa + wb + wc;
             visit(Fragment {
                 index: y as usize * width as usize + x as usize,
                 near: (la * a.near + lb * b.near + lc * c.near) as f32,
-                normal: (a.normal * wa + b.normal * wb + c.normal * wc) / (wa + wb + wc),
+                normal: (a.normal * wa + b.normal * wb + c.normal * wc) / all,
+                // Divided first: the sum of large coordinates may overflow.
+                point: a.point * (wa / all) + b.point * (wb / all) + c.point * (wc / all),
                 to_edge,
             });
         }
@@ -113,7 +120,7 @@ mod tests {
     use super::*;
 
     fn spot(x: f64, y: f64) -> Spot {
-        Spot { x, y, near: x, iw: 1.0, normal: DVec3::Z, edge: true }
+        Spot { x, y, near: x, iw: 1.0, normal: DVec3::Z, point: DVec3::ZERO, edge: true }
     }
 
     #[test]

@@ -40,6 +40,9 @@ impl Default for Style {
 /// Light that comes from everywhere, and that of the lamp at the left above the eye.
 const AMBIENT: f64 = 0.2;
 const LAMP: f64 = 0.8;
+/// The same where colours have a meaning.
+const FLAT_AMBIENT: f64 = 0.55;
+const FLAT_LAMP: f64 = 0.45;
 /// Half the breadth of a wireframe's line, in samples. A line is drawn from both sides of an edge.
 const HALF_LINE: f64 = 0.6;
 /// What a wireframe's line leaves of the light.
@@ -50,14 +53,86 @@ const LINE_SHADE: f64 = 0.15;
 /// A normal is turned to the eye before shading, so that orientation does not show. What is not finite after projection is left out.
 /// Time grows with the triangles, and with the pixels each covers.
 pub fn render(surface: &Surface, view: &View, style: &Style) -> Picture {
-    let samples = style.samples.clamp(1, 4);
-    let large = view.enlarged(samples);
-    let samples = large.width() / view.width();
-    let mut depth = vec![f32::NEG_INFINITY; large.width() as usize * large.height() as usize];
-    let mut light = vec![style.background; depth.len()];
-    let lamp = DVec3::new(-0.4, 0.7, 0.8).normalize();
-    project(surface, &large, style.shading == Shading::Smooth, |triangle, spots| {
+    let (large, samples) = enlarged(view, style);
+    let mut light = vec![style.background; large.width() as usize * large.height() as usize];
+    draw(surface, &large, style, [AMBIENT, LAMP], |f, triangle, shade| {
         let color = surface.palette[surface.triangles[triangle].color as usize];
+        light[f.index] = color.map(|c| (c as f64 * shade) as f32);
+    });
+    developed(&light, view, samples)
+}
+
+/// Draws the surface in colours that depend on the place: `paint` gets points of the surface in the world, and returns linear colours, 0 to
+/// 1. It is asked once a pixel, in no order.
+///
+/// Shading is weaker than that of [`render`], so that colours can be told apart; otherwise the same.
+pub fn render_painted(
+    surface: &Surface,
+    view: &View,
+    style: &Style,
+    paint: impl Fn(&[DVec3]) -> Vec<[f32; 3]> + Sync,
+) -> Picture {
+    let (large, samples) = enlarged(view, style);
+    // Of every sample: how light it is, and where.
+    let mut seen: Vec<Option<(f32, DVec3)>> = vec![None; large.width() as usize * large.height() as usize];
+    draw(surface, &large, style, [FLAT_AMBIENT, FLAT_LAMP], |f, _, shade| seen[f.index] = Some((shade as f32, f.point)));
+
+    let across = large.width() as usize;
+    let n = samples as usize;
+    let pixels = (0..view.width() as usize * view.height() as usize).map(|i| {
+        let (x, y) = (i % view.width() as usize, i / view.width() as usize);
+        (0..n * n).map(move |k| (y * n + k / n) * across + x * n + k % n)
+    });
+    // The first sample that is covered stands for the pixel.
+    let first: Vec<Option<DVec3>> =
+        pixels.clone().map(|mut at| at.find_map(|s| seen[s].map(|s| s.1))).collect();
+    let points: Vec<DVec3> = first.iter().flatten().copied().collect();
+    let mut colors = in_chunks(&points, &paint).into_iter();
+    let mut light = vec![style.background; seen.len()];
+    for (at, first) in pixels.zip(first) {
+        let Some(color) = first.and_then(|_| colors.next()) else { continue };
+        for s in at {
+            if let Some((shade, _)) = seen[s] {
+                light[s] = color.map(|c| c * shade);
+            }
+        }
+    }
+    developed(&light, view, samples)
+}
+
+/// Points that are painted at a time.
+const CHUNK: usize = 2048;
+
+/// The colours of all points, in order.
+fn in_chunks(points: &[DVec3], paint: &(impl Fn(&[DVec3]) -> Vec<[f32; 3]> + Sync)) -> Vec<[f32; 3]> {
+    #[cfg(feature = "parallel")]
+    let chunks: Vec<_> = {
+        use rayon::prelude::*;
+        points.par_chunks(CHUNK).map(paint).collect()
+    };
+    #[cfg(not(feature = "parallel"))]
+    let chunks: Vec<_> = points.chunks(CHUNK).map(paint).collect();
+    chunks.concat()
+}
+
+/// The view that has a pixel for every sample, and samples along each side of a pixel.
+fn enlarged(view: &View, style: &Style) -> (View, u32) {
+    let large = view.enlarged(style.samples.clamp(1, 4));
+    let samples = large.width() / view.width();
+    (large, samples)
+}
+
+/// Calls `set` for samples that are nearer than what was there: with the triangle, and the light it gives back.
+fn draw(
+    surface: &Surface,
+    large: &View,
+    style: &Style,
+    [ambient, lamp]: [f64; 2],
+    mut set: impl FnMut(&Fragment, usize, f64),
+) {
+    let mut depth = vec![f32::NEG_INFINITY; large.width() as usize * large.height() as usize];
+    let from = DVec3::new(-0.4, 0.7, 0.8).normalize();
+    project(surface, large, style.shading == Shading::Smooth, |triangle, spots| {
         fill(spots, large.width(), large.height(), |f: Fragment| {
             // Of two at the same depth the first stays.
             if f.near <= depth[f.index] {
@@ -66,14 +141,13 @@ pub fn render(surface: &Surface, view: &View, style: &Style) -> Picture {
             depth[f.index] = f.near;
             let n = f.normal.normalize_or(DVec3::Z);
             let n = if n.z < 0.0 { -n } else { n };
-            let mut shade = AMBIENT + LAMP * n.dot(lamp).max(0.0);
+            let mut shade = ambient + lamp * n.dot(from).max(0.0);
             if style.wireframe && f.to_edge < HALF_LINE {
                 shade *= LINE_SHADE;
             }
-            light[f.index] = color.map(|c| (c as f64 * shade) as f32);
+            set(&f, triangle, shade);
         });
     });
-    developed(&light, view, samples)
 }
 
 /// The mean of every pixel's samples, from linear light to 8 bits. The square root is near the sRGB curve, and exact everywhere.
@@ -148,10 +222,10 @@ fn project(surface: &Surface, view: &View, smooth: bool, mut draw: impl FnMut(us
         let flat = face_normal(world, view);
         let own = surface.normals.get(i).filter(|_| smooth);
         polygon.clear();
-        for (k, s) in [a, b, c].into_iter().enumerate() {
+        for (k, (s, point)) in [a, b, c].into_iter().zip(world).enumerate() {
             let normal = own.map(|n| n[k].as_dvec3()).and_then(DVec3::try_normalize);
             let normal = normal.map_or(flat, |n| view.direction(n));
-            polygon.push(Corner { x: s.x, y: s.y, w: s.w, z: s.z, normal, edge: t.edges >> k & 1 == 1 });
+            polygon.push(Corner { x: s.x, y: s.y, w: s.w, z: s.z, normal, point, edge: t.edges >> k & 1 == 1 });
         }
         clip(&mut polygon, &mut scratch, view);
         let spot = |c: &Corner, edge: bool| Spot {
@@ -160,6 +234,7 @@ fn project(surface: &Surface, view: &View, smooth: bool, mut draw: impl FnMut(us
             near: view.nearness(c.w, c.z),
             iw: 1.0 / c.w,
             normal: c.normal,
+            point: c.point,
             edge,
         };
         let n = polygon.len();
