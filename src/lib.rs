@@ -1,6 +1,6 @@
 //! progmesh: progressive and multiresolution meshes.
 //!
-//! Scenes and file formats ([`scene`], [`io`]), simplification of whole scenes ([`pipeline`]), pictures of them ([`report`]), and the
+//! Scenes and file formats ([`scene`], [`io`]), simplification of whole scenes ([`pipeline`]), comparing two of them ([`compare`]), pictures ([`report`]), and the
 //! libraries below under short names: [`aif`] (the mesh), [`simplify`], [`refine`] (levels), [`meshes`] (samples). All works
 //! on bytes and arrays; only `io::files` (feature `files`) opens paths. `ARCHITECTURE.md` says how the parts fit together.
 
@@ -9,6 +9,7 @@ pub use progmesh_meshes as meshes;
 pub use progmesh_refine as refine;
 pub use progmesh_simplify as simplify;
 
+pub mod compare;
 pub mod io;
 pub mod normals;
 pub mod pipeline;

@@ -6,6 +6,7 @@ use super::control::Interrupt;
 use progmesh::io::files::{self, Loaded, ReadError, WriteError};
 use progmesh::io::{EncodeOptions, Format, encode};
 pub(crate) use progmesh::pipeline::thousands;
+pub(crate) use progmesh::report::short;
 use progmesh::scene::Scene;
 use serde::Serialize;
 use std::borrow::Cow;
@@ -142,28 +143,9 @@ pub(crate) fn in_pool<R: Send>(
     pool.install(work)
 }
 
-/// A length or the like, in four digits.
-pub(crate) fn short(x: f64) -> String {
-    match x.abs() {
-        0.0 => "0".into(),
-        a if (1e-3..1e5).contains(&a) => {
-            let digits = (3 - a.log10().floor() as i32).max(0) as usize;
-            let text = format!("{x:.digits$}");
-            if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
-        }
-        _ => format!("{x:.3e}"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_are_grouped_and_short() {
-        assert_eq!([0, 999, 1000, 1234567].map(thousands), ["0", "999", "1,000", "1,234,567"]);
-        assert_eq!([0.0, 1.0, 0.12345, 1234.56, 1e-9].map(short), ["0", "1", "0.1235", "1235", "1.000e-9"]);
-    }
 
     #[test]
     fn what_a_terminal_would_obey_is_replaced() {

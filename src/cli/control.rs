@@ -49,15 +49,15 @@ pub(crate) struct Progress<'a> {
 const STEPS: u64 = 1000;
 
 impl<'a> Progress<'a> {
-    pub(crate) fn new(interrupt: &'a Interrupt, quiet: bool) -> Self {
+    pub(crate) fn new(interrupt: &'a Interrupt, quiet: bool, doing: &str) -> Self {
         let target = if quiet || !std::io::stderr().is_terminal() {
             ProgressDrawTarget::hidden()
         } else {
             ProgressDrawTarget::stderr()
         };
         let bar = ProgressBar::with_draw_target(Some(STEPS), target);
-        if let Ok(style) = ProgressStyle::with_template("simplifying [{bar:40}] {percent:>3} % {eta:>4} left")
-        {
+        let template = format!("{doing} [{{bar:40}}] {{percent:>3}} % {{eta:>4}} left");
+        if let Ok(style) = ProgressStyle::with_template(&template) {
             bar.set_style(style.progress_chars("=> "));
         }
         Progress { interrupt, bar }

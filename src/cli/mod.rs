@@ -5,10 +5,12 @@
 
 mod args;
 mod common;
+mod compare;
 mod completions;
 mod control;
 mod convert;
 mod generate;
+mod heatmap;
 mod info;
 mod man;
 mod picture;
@@ -18,7 +20,7 @@ mod simplify;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Simplify, inspect, convert and generate polygon meshes: OBJ, glTF, PLY, STL, OFF.
+/// Simplify, inspect, compare, convert and generate polygon meshes: OBJ, glTF, PLY, STL, OFF.
 #[derive(Parser)]
 #[command(name = "progmesh", version, max_term_width = 100, after_help = EXIT_CODES, propagate_version = true)]
 struct Cli {
@@ -34,6 +36,7 @@ Exit codes: 0 done; 1 done, but the target was missed or a check failed; 2 wrong
 enum Command {
     Simplify(Box<simplify::Args>),
     Info(info::Args),
+    Compare(compare::Args),
     Convert(convert::Args),
     Generate(generate::Args),
     Completions(completions::Args),
@@ -99,6 +102,7 @@ pub(crate) fn main() -> ExitCode {
     let result = match command {
         Command::Simplify(args) => args.run(),
         Command::Info(args) => args.run(),
+        Command::Compare(args) => args.run(),
         Command::Convert(args) => args.run(),
         Command::Generate(args) => args.run(),
         Command::Completions(args) => args.run(),

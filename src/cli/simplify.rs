@@ -24,6 +24,7 @@ Examples:
   progmesh simplify bunny.obj half.obj --ratio 0.5
   progmesh simplify scene.glb small.glb --triangles 10000
   progmesh simplify scan.ply scan.stl --max-error 0.001 --relative
+  progmesh simplify scan.ply scan.stl --max-error 0.001 --relative --certified
   progmesh simplify horse.ply out.ply --method nsa --epsilon 12 --passes 5
   progmesh simplify map.obj out.obj --ratio 0.1 --lock-border --lock-material water
   progmesh simplify scan.ply out.ply --ratio 0.1 --png before-and-after.png
@@ -72,6 +73,14 @@ pub(crate) struct Args {
     /// --max-error is a part of the bounding box's diagonal
     #[arg(long, requires = "max_error", help_heading = "Target")]
     relative: bool,
+    /// Make --max-error a guarantee: no point of either surface is farther than that from the other, proven
+    ///
+    /// Takes as few triangles as that allows, found by some runs of the method. --ratio or --triangles end the search from below.
+    #[arg(long, requires = "max_error", conflicts_with = "per_mesh", help_heading = "Target")]
+    certified: bool,
+    /// Measure the distance of the result from the input, both as they stand in the world
+    #[arg(long, help_heading = "Target")]
+    measure: bool,
     /// Each mesh of a scene gets the ratio (or the error) by itself, instead of a shared target
     #[arg(long, conflicts_with = "triangles", help_heading = "Target")]
     per_mesh: bool,
@@ -157,7 +166,7 @@ impl Args {
                 d.add(&scene).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
             }
             let instanced_in = scene.instanced_triangles();
-            let result = simplify_scene(scene, &job, &Progress::new(&interrupt, self.quiet));
+            let result = simplify_scene(scene, &job, &Progress::new(&interrupt, self.quiet, "simplifying"));
             let (scene, summary) = result.map_err(|e| failure(&file, e))?;
             warnings.say(summary.warnings.iter().map(|w| format!("{file}: {w}")));
             warnings.say(self.nothing_merged(&summary).map(|w| format!("{file}: {w}")));
@@ -185,6 +194,7 @@ impl Args {
                 read,
                 build: summary.build_seconds,
                 simplify: summary.simplify_seconds,
+                measure: summary.measure_seconds,
                 write,
                 draw: drawing.as_ref().map_or(0.0, |d| d.seconds),
                 total: start.elapsed().as_secs_f64(),
@@ -262,6 +272,8 @@ impl Args {
         job.weld = self.shape.weld();
         job.normals = self.shape.normals()?;
         job.per_mesh = self.per_mesh;
+        job.measure = self.measure;
+        job.certified = self.certified;
         job.lock_materials = self.lock_material.clone();
         job.lock_groups = self.lock_group.clone();
         job.weights_property = self.weights_property.clone();

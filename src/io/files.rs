@@ -126,7 +126,8 @@ pub fn write_scene(path: impl AsRef<Path>, scene: &Scene) -> Result<Vec<String>,
 /// Encoding options for this output: the stem of its name.
 pub fn encode_options(path: &Path, text: bool) -> EncodeOptions {
     let stem = if is_dash(path) { None } else { path.file_stem() };
-    EncodeOptions { text, stem: stem.map_or_else(|| "mesh".into(), |s| s.to_string_lossy().into_owned()) }
+    let stem = stem.map_or_else(|| "mesh".into(), |s| s.to_string_lossy().into_owned());
+    EncodeOptions { text, stem, ..Default::default() }
 }
 
 /// True for `-`.

@@ -77,6 +77,8 @@ pub struct EncodeOptions {
     pub text: bool,
     /// Stem of the output file, for the names of files beside it.
     pub stem: String,
+    /// Facts about the content, by name: comments in the head of a PLY file, extras of the (first) scene in glTF; others hold none.
+    pub facts: Vec<(String, serde_json::Value)>,
 }
 
 /// Why a file could not be decoded. The file's name is added by whoever opened it.

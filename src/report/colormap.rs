@@ -43,7 +43,7 @@ pub fn heat_bytes(t: f64) -> [u8; 3] {
 }
 
 /// sRGB to linear light, by the curve of IEC 61966-2-1.
-pub(super) fn linear(c: f64) -> f64 {
+pub(crate) fn linear(c: f64) -> f64 {
     if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
 }
 

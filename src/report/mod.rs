@@ -1,4 +1,4 @@
-//! Looking at results: pictures and silhouettes of a scene, drawn in software, without a display.
+//! Looking at results: pictures, heat maps and silhouettes of a scene, drawn in software, without a display; tables and pages.
 //!
 //! A [`Surface`] is what a scene shows, as triangles in the world; a [`View`] says from where; [`render`] draws a [`Picture`], and
 //! [`silhouette`] the [`Mask`] of what is covered. The same surface and view give the same pixels on every platform:
@@ -9,14 +9,21 @@
 mod clip;
 mod colormap;
 mod font;
+mod heat;
+mod page;
 mod picture;
 mod raster;
 mod render;
 mod surface;
+mod table;
 mod view;
 
+pub(crate) use colormap::linear;
 pub use colormap::{heat_bytes, heat_color};
+pub use heat::{Scale, Titles, heat_panels};
+pub use page::Page;
 pub use picture::Picture;
 pub use render::{Mask, Shading, Style, render, render_painted, silhouette};
 pub use surface::{Surface, SurfaceError};
+pub use table::{Table, short};
 pub use view::{Projection, View};

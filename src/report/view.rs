@@ -98,15 +98,21 @@ impl View {
     }
 
     /// The same, moved and scaled so that the surface itself, not its box, fills the picture. For orthographic views; others stay.
-    pub fn tightened(mut self, surface: &Surface) -> View {
+    pub fn tightened(self, surface: &Surface) -> View {
+        self.tightened_to(&[surface])
+    }
+
+    /// The same for several surfaces: all of them fit.
+    pub fn tightened_to(mut self, surfaces: &[&Surface]) -> View {
         if self.projection != Projection::Orthographic {
             return self;
         }
-        let corners = surface.triangles.iter().flat_map(|t| t.corners);
-        let seen = corners.filter_map(|v| self.see(surface.points[v as usize]));
         let (mut lo, mut hi) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        for s in seen {
-            (lo, hi) = (lo.min(DVec2::new(s.x, s.y)), hi.max(DVec2::new(s.x, s.y)));
+        for surface in surfaces {
+            let corners = surface.triangles.iter().flat_map(|t| t.corners);
+            for s in corners.filter_map(|v| self.see(surface.points[v as usize])) {
+                (lo, hi) = (lo.min(DVec2::new(s.x, s.y)), hi.max(DVec2::new(s.x, s.y)));
+            }
         }
         let sides = DVec2::new(self.width as f64, self.height as f64);
         let factor = (FILL * sides / (hi - lo)).min_element();

@@ -29,7 +29,7 @@ impl Args {
         };
         common::note(&format!(
             "{file}: {} -> {} faces ({percent:.1} %), {} vertices{}; {}, {:.3} s (read {:.3}, build {:.3}, simplify {:.3}, \
-             write {:.3}{}); estimated error {}{relative}; stopped: {}",
+             write {:.3}{}{}); estimated error {}{relative}{}; stopped: {}",
             thousands(s.faces_in),
             thousands(s.faces_out),
             thousands(s.vertices_out),
@@ -40,8 +40,10 @@ impl Args {
             t.build,
             t.simplify,
             t.write,
+            if t.measure > 0.0 { format!(", measure {:.3}", t.measure) } else { String::new() },
             if t.draw > 0.0 { format!(", draw {:.3}", t.draw) } else { String::new() },
             short(s.estimate),
+            found(s),
             match s.stop {
                 Stop::Target => "target reached",
                 Stop::Error => "error bound reached",
@@ -76,7 +78,8 @@ impl Args {
                 _ => "no_legal_collapse",
             },
             estimate: s.estimate,
-            measured: None,
+            measured: s.measured.map(|m| MeasuredReport { max: m.max, rms: m.rms, mean: m.mean }),
+            certified: s.certified.map(|c| CertifiedReport { bound: c.bound, upper: c.upper, runs: c.runs }),
             levels: s
                 .levels
                 .iter()
@@ -114,7 +117,8 @@ pub(super) struct Report {
     seconds: Seconds,
     stop: &'static str,
     estimate: f64,
-    measured: Option<()>,
+    measured: Option<MeasuredReport>,
+    certified: Option<CertifiedReport>,
     levels: Vec<LevelReport>,
     aif_bytes: usize,
     peak_bytes: Option<u64>,
@@ -122,10 +126,37 @@ pub(super) struct Report {
 }
 
 #[derive(Serialize)]
+struct MeasuredReport {
+    max: f64,
+    rms: f64,
+    mean: f64,
+}
+
+#[derive(Serialize)]
+struct CertifiedReport {
+    bound: f64,
+    upper: f64,
+    runs: usize,
+}
+
+/// What was measured and proven, for people.
+fn found(s: &Summary) -> String {
+    let mut text = String::new();
+    if let Some(m) = s.measured {
+        text += &format!("; measured: max {}, rms {}, mean {}", short(m.max), short(m.rms), short(m.mean));
+    }
+    if let Some(c) = s.certified {
+        text += &format!("; proven: at most {} (asked for {}, {})", short(c.upper), short(c.bound), count(c.runs, "run"));
+    }
+    text
+}
+
+#[derive(Serialize)]
 pub(super) struct Seconds {
     pub(super) read: f64,
     pub(super) build: f64,
     pub(super) simplify: f64,
+    pub(super) measure: f64,
     pub(super) write: f64,
     pub(super) draw: f64,
     pub(super) total: f64,

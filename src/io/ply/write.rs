@@ -30,7 +30,10 @@ pub fn encode(scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeE
     }
     let plan = Plan::new(input, &textures, warnings);
     let out = if options.text { Sink::Text(Vec::new()) } else { Sink::Binary(Vec::new()) };
-    encoded.bytes = write(input, &textures, &plan, out);
+    // A comment ends with its line.
+    let line = |text: String| text.replace(|c: char| c.is_control(), " ");
+    let comments = options.facts.iter().map(|(name, value)| line(format!("{name} {value}"))).collect();
+    encoded.bytes = write(input, &textures, &plan, comments, out);
     Ok(encoded)
 }
 
@@ -365,7 +368,7 @@ impl Sink {
     }
 }
 
-fn write(input: &MeshInput, textures: &Textures, plan: &Plan<'_>, mut sink: Sink) -> Vec<u8> {
+fn write(input: &MeshInput, textures: &Textures, plan: &Plan<'_>, comments: Vec<String>, mut sink: Sink) -> Vec<u8> {
     let longest = faces(input).map(|f| f.len()).max().unwrap_or(0);
     let count = |n: usize| if n <= 255 { Type::U8 } else { Type::U32 };
     let index = if input.positions.len() <= i32::MAX as usize { Type::I32 } else { Type::U32 };
@@ -376,6 +379,9 @@ fn write(input: &MeshInput, textures: &Textures, plan: &Plan<'_>, mut sink: Sink
         Sink::Text(_) => "format ascii 1.0\n",
         Sink::Binary(_) => "format binary_little_endian 1.0\n",
     });
+    for comment in comments {
+        header.push_str(&format!("comment {comment}\n"));
+    }
     for (_, name) in &textures.files {
         header.push_str(&format!("comment TextureFile {name}\n"));
     }

@@ -1,0 +1,98 @@
+//! A comparison as tables.
+
+use super::Comparison;
+use crate::pipeline::thousands;
+use crate::report::{Table, short};
+use crate::simplify::measure::{Farthest, Summary};
+use glam::DVec3;
+
+impl Comparison {
+    /// All measures for people. Numbers are those of the fields.
+    pub fn tables(&self) -> Vec<Table> {
+        let mut tables = vec![self.distance_table()];
+        tables.extend(self.certified_table());
+        tables.push(self.farthest_table());
+        tables
+    }
+
+    fn distance_table(&self) -> Table {
+        let d = &self.distances;
+        let mut table = Table::new(&["distance", "A to B", "B to A", "worse", "worse / diagonal"]);
+        let sides = [&d.a_to_b.summary, &d.b_to_a.summary, &d.worse];
+        let numbers: [(&str, fn(&Summary) -> f64); 8] = [
+            ("max", |s| s.max),
+            ("rms", |s| s.rms),
+            ("mean", |s| s.mean),
+            ("50 % of the area within", |s| s.quantiles.p50),
+            ("90 %", |s| s.quantiles.p90),
+            ("95 %", |s| s.quantiles.p95),
+            ("99 %", |s| s.quantiles.p99),
+            ("99.9 %", |s| s.quantiles.p999),
+        ];
+        for (name, number) in numbers {
+            let mut cells = vec![name.to_string()];
+            cells.extend(sides.iter().map(|s| short(number(s))));
+            cells.push(match d.diagonal > 0.0 {
+                true => format!("{} %", short(100.0 * number(&d.worse) / d.diagonal)),
+                false => "-".into(),
+            });
+            table.row(cells);
+        }
+        let both = |x: [usize; 2]| ["", "", ""].map(String::from).into_iter().zip(x.map(thousands)).map(|(_, t)| t);
+        let counts = |name: &str, x: [usize; 2]| {
+            let mut cells = vec![name.to_string()];
+            cells.extend(both(x));
+            cells.extend(["", ""].map(String::from));
+            cells
+        };
+        table.row(counts("area samples", [d.a_to_b.samples, d.b_to_a.samples]));
+        table.row(counts("vertices", [d.a_to_b.vertices, d.b_to_a.vertices]));
+        table
+    }
+
+    fn certified_table(&self) -> Option<Table> {
+        let c = self.certified.as_ref()?;
+        let mut table = Table::new(&["proven largest distance", "A to B", "B to A", "two-sided", "/ diagonal"]);
+        let d = self.distances.diagonal;
+        let rows = [
+            ("at least", [c.a_to_b.lower, c.b_to_a.lower, c.lower]),
+            ("at most", [c.a_to_b.upper, c.b_to_a.upper, c.upper]),
+        ];
+        for (name, values) in rows {
+            let mut cells = vec![name.to_string()];
+            cells.extend(values.map(long));
+            cells.push(if d > 0.0 { format!("{} %", long(100.0 * values[2] / d)) } else { "-".into() });
+            table.row(cells);
+        }
+        Some(table)
+    }
+
+    fn farthest_table(&self) -> Table {
+        let mut table = Table::new(&["farthest point found", "at", "closest on the other", "distance"]);
+        let mut row = |name: &str, f: &Farthest| {
+            table.row([name.to_string(), point(f.point), point(f.closest), short(f.distance)]);
+        };
+        row("of A", &self.distances.a_to_b.farthest);
+        row("of B", &self.distances.b_to_a.farthest);
+        if let Some(c) = &self.certified {
+            row(if c.witness_on_a { "proven, of A" } else { "proven, of B" }, &c.witness);
+        }
+        table
+    }
+}
+
+/// In seven digits: bounds that are close to each other differ.
+fn long(x: f64) -> String {
+    match x.abs() {
+        0.0 => "0".into(),
+        a if (1e-3..1e5).contains(&a) => {
+            let digits = (6 - a.log10().floor() as i32).max(0) as usize;
+            format!("{x:.digits$}")
+        }
+        _ => format!("{x:.6e}"),
+    }
+}
+
+fn point(p: DVec3) -> String {
+    p.to_array().map(short).join(" ")
+}

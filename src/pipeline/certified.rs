@@ -1,0 +1,185 @@
+//! As few triangles as a proven bound of the distance allows: a search over runs of the method.
+
+use super::{Job, JobError, Part, Proven, Summary, run, scale};
+use crate::compare::{CompareError, Flattened};
+use crate::scene::Scene;
+use crate::simplify::measure::{CertifyOptions, MeasureError, Within, within};
+use crate::simplify::{Control, Stop};
+use std::time::Instant;
+
+/// The search ends where a number of triangles passes and one this much smaller does not. What is promised is 1.1.
+const CLOSE: f64 = 1.03;
+/// The first step from a number that passes to one that does not, or the other way; steps grow, the error falling about as the number rises.
+const STEP: f64 = 1.4;
+/// Of the bound: closer to it than this a result is not looked into further, and does not pass. The error falls about as the number of
+/// triangles rises, so this costs half a per cent of them.
+const NEAR: f64 = 0.005;
+/// The estimate that the first run stops at, of the bound: the largest distance of quadric results is about twice their largest estimate.
+const ESTIMATE: f64 = 0.5;
+/// Runs that a search takes, about; for the progress bar.
+const RUNS: f64 = 9.0;
+
+/// A result that passed.
+struct Passed {
+    scene: Scene,
+    summary: Summary,
+    upper: f64,
+}
+
+/// Simplifies to the fewest triangles of which the distance is proven to be at most `job.options.max_error`.
+pub(super) fn simplify(
+    scene: Scene,
+    input: &Flattened,
+    job: &Job,
+    control: &dyn Control,
+) -> Result<(Scene, Summary), JobError> {
+    let bound = job.options.max_error.ok_or(JobError::NoBound)?;
+    let bound = if bound.relative { bound.value * scale::world_diagonal(&scene) } else { bound.value };
+    let all = scene.unique_triangles();
+    let mut search = Search { scene: &scene, input, job, control, bound, runs: 0, seconds: [0.0; 3] };
+    // Targets of the job end the search from below.
+    let floor = super::target(&job.options, &[all], false).unwrap_or(1).clamp(1, all);
+
+    // The number that passes is `high`, that does not is `low`; each `None` until there is one.
+    let (mut high, mut low): (Option<usize>, Option<usize>) = (None, None);
+    let mut best: Option<Passed> = None;
+    let mut next = None;
+    let mut step = STEP;
+    loop {
+        let (asked, found) = search.probe(next)?;
+        let Some((passed, summary, scene)) = found else {
+            // Cancelled: the input, as far as a caller cares.
+            let (scene, mut summary) = search.unchanged()?;
+            summary.stop = Stop::Cancelled;
+            return Ok((scene, summary));
+        };
+        let got = summary.triangles_out;
+        // With an estimate for a target, the number that came of it stands for it.
+        let asked = asked.unwrap_or(got).max(floor);
+        // Fewer cannot be had.
+        let stuck = got > asked;
+        match passed {
+            Some(upper) => {
+                high = Some(asked);
+                if best.as_ref().is_none_or(|b| got <= b.summary.triangles_out) {
+                    best = Some(Passed { scene, summary, upper });
+                }
+                if stuck || asked <= floor {
+                    break;
+                }
+            }
+            None => {
+                low = Some(asked.max(low.unwrap_or(0)));
+                if asked >= all {
+                    break;
+                }
+            }
+        }
+        next = Some(match (high, low) {
+            (Some(h), Some(l)) if (h as f64) <= CLOSE * l as f64 || h <= l + 1 => break,
+            (Some(h), Some(l)) => ((h as f64 * l as f64).sqrt().round() as usize).clamp(l + 1, h - 1),
+            (Some(h), None) => ((h as f64 / step) as usize).clamp(floor, h - 1),
+            (None, Some(l)) => ((l as f64 * step).ceil() as usize).clamp((l + 1).min(all), all),
+            (None, None) => break,
+        });
+        if high.is_none() || low.is_none() {
+            step *= STEP;
+        }
+    }
+    let passed = best.map(|b| (b.scene, b.summary, b.upper));
+    let (scene, mut summary, upper) = match passed {
+        Some(passed) => passed,
+        // Nothing passes but the input itself.
+        None => {
+            let (scene, summary) = search.unchanged()?;
+            (scene, summary, 0.0)
+        }
+    };
+    let target = super::target(&job.options, &[all], false);
+    let reached = target.is_some_and(|t| summary.triangles_out <= t);
+    summary.stop = match summary.stop {
+        _ if reached => Stop::Target,
+        Stop::NoLegalCollapse if low.is_none() => Stop::NoLegalCollapse,
+        _ => Stop::Error,
+    };
+    summary.target = None;
+    summary.certified = Some(Proven { bound, upper, runs: search.runs });
+    [summary.build_seconds, summary.simplify_seconds, summary.measure_seconds] = search.seconds;
+    Ok((scene, summary))
+}
+
+struct Search<'a> {
+    scene: &'a Scene,
+    input: &'a Flattened,
+    job: &'a Job,
+    control: &'a dyn Control,
+    bound: f64,
+    runs: usize,
+    /// Building, simplifying, measuring.
+    seconds: [f64; 3],
+}
+
+/// The bound that was proven, if it was; what came of the run.
+type Probe = (Option<f64>, Summary, Scene);
+
+impl Search<'_> {
+    /// One run to this many triangles, or by the estimate; `None` when cancelled.
+    fn probe(&mut self, triangles: Option<usize>) -> Result<(Option<usize>, Option<Probe>), JobError> {
+        let mut job = self.job.clone();
+        (job.certified, job.measure, job.per_mesh) = (false, false, false);
+        job.options.ratio = None;
+        job.options.triangles = triangles;
+        job.options.max_error = match (triangles, self.job.options.max_error) {
+            (None, Some(mut e)) => {
+                e.value *= ESTIMATE;
+                Some(e)
+            }
+            _ => None,
+        };
+        let start = (self.runs as f64 / RUNS).min(0.95);
+        let share = (1.0 / RUNS).min(0.99 - start);
+        self.runs += 1;
+        let (scene, summary) = run(self.scene.clone(), &job, &Part::new(self.control, start, 0.5 * share))?;
+        self.seconds[0] += summary.build_seconds;
+        self.seconds[1] += summary.simplify_seconds;
+        if summary.stop == Stop::Cancelled {
+            return Ok((triangles, None));
+        }
+        let now = Instant::now();
+        let control = Part::new(self.control, start + 0.5 * share, 0.5 * share);
+        let upper = match self.proven(&scene, &control) {
+            Err(CompareError::Measure(MeasureError::Cancelled)) => return Ok((triangles, None)),
+            upper => upper?,
+        };
+        self.seconds[2] += now.elapsed().as_secs_f64();
+        Ok((triangles, Some((upper, summary, scene))))
+    }
+
+    /// A bound of the distance, at most the one asked for; `None` if there is none.
+    fn proven(&self, result: &Scene, control: &dyn Control) -> Result<Option<f64>, CompareError> {
+        let result = match Flattened::of(result) {
+            Err(CompareError::Measure(MeasureError::NoTriangle)) => return Ok(None),
+            result => result?,
+        };
+        let mut options = CertifyOptions::with_tolerance(NEAR * self.bound);
+        options.threads = self.job.options.threads;
+        Ok(match within(&self.input.surface, &result.surface, self.bound, &options, control)? {
+            Within::Yes { upper } => Some(upper),
+            _ => None,
+        })
+    }
+
+    /// The input as it is, and a summary that says so.
+    fn unchanged(&self) -> Result<(Scene, Summary), JobError> {
+        let mut job = Job::default();
+        job.options.triangles = Some(self.scene.unique_triangles());
+        let (_, mut summary) = run(self.scene.clone(), &job, &crate::simplify::Quiet)?;
+        let meshes = || self.scene.meshes.iter().map(|m| &m.geometry);
+        summary.faces_out = meshes().map(|g| g.face_count()).sum();
+        summary.vertices_out = meshes().map(|g| g.positions.len()).sum();
+        summary.triangles_out = self.scene.unique_triangles();
+        summary.warnings = vec!["no simpler mesh passes: the result is the input as it was".into()];
+        (summary.stop, summary.estimate) = (Stop::Error, 0.0);
+        Ok((self.scene.clone(), summary))
+    }
+}
