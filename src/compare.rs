@@ -7,10 +7,10 @@ use crate::io::flatten::flatten;
 use crate::pipeline::Part;
 use crate::report::{Scale, SurfaceError, short};
 use crate::scene::Scene;
+use crate::simplify::Control;
 use crate::simplify::measure::{
     Certified, CertifyOptions, DistanceOptions, Distances, MeasureError, Surface, certify, distance,
 };
-use crate::simplify::Control;
 use glam::DVec3;
 use std::time::Instant;
 
@@ -126,8 +126,7 @@ pub fn compare(
     // Proving takes about as long as sampling, more or less.
     let half = if options.certify.is_some() { 0.5 } else { 1.0 };
     let start = Instant::now();
-    let distances =
-        distance(&a.surface, &b.surface, &options.distance, &Part::new(control, 0.0, half))?;
+    let distances = distance(&a.surface, &b.surface, &options.distance, &Part::new(control, 0.0, half))?;
     let distance_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let certified = match options.certify {

@@ -187,11 +187,7 @@ pub enum JobError {
 ///
 /// The target counts the triangles of the unique meshes and is shared by world-space error, unless `per_mesh` is set. A cancelled job returns
 /// what there is, with [`Stop::Cancelled`]. Never panics on any scene a decoder of this crate returns.
-pub fn simplify_scene(
-    scene: Scene,
-    job: &Job,
-    control: &dyn Control,
-) -> Result<(Scene, Summary), JobError> {
+pub fn simplify_scene(scene: Scene, job: &Job, control: &dyn Control) -> Result<(Scene, Summary), JobError> {
     if !job.measure && !job.certified {
         return run(scene, job, control);
     }

@@ -20,6 +20,8 @@ struct Simplify {
     estimate: Option<f64>,
     #[serde(deserialize_with = "present")]
     measured: Option<Measured>,
+    #[serde(deserialize_with = "present")]
+    certified: Option<Certified>,
     levels: Vec<Level>,
     aif_bytes: usize,
     #[serde(deserialize_with = "present")]
@@ -38,6 +40,7 @@ struct Seconds {
     read: f64,
     build: f64,
     simplify: f64,
+    measure: f64,
     write: f64,
     draw: f64,
     total: f64,
@@ -58,6 +61,118 @@ struct InfoTriangles {
     file: usize,
     built: usize,
     instanced: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Certified {
+    bound: f64,
+    upper: f64,
+    runs: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Compare {
+    command: String,
+    a: String,
+    b: String,
+    triangles: [usize; 2],
+    diagonal: f64,
+    samples: usize,
+    seed: u64,
+    a_to_b: Side,
+    b_to_a: Side,
+    worse: Numbers,
+    #[serde(deserialize_with = "present")]
+    relative: Option<Numbers>,
+    #[serde(deserialize_with = "present")]
+    certified: Option<Proof>,
+    #[serde(deserialize_with = "present")]
+    threshold: Option<Threshold>,
+    seconds: CompareSeconds,
+    #[serde(deserialize_with = "present")]
+    peak_bytes: Option<u64>,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Side {
+    max: f64,
+    rms: f64,
+    mean: f64,
+    quantiles: Quantiles,
+    farthest: Point,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Numbers {
+    max: f64,
+    rms: f64,
+    mean: f64,
+    quantiles: Quantiles,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Quantiles {
+    p50: f64,
+    p90: f64,
+    p95: f64,
+    p99: f64,
+    p999: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Point {
+    point: [f64; 3],
+    triangle: u32,
+    closest: [f64; 3],
+    closest_triangle: u32,
+    distance: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Proof {
+    lower: f64,
+    upper: f64,
+    tolerance: f64,
+    converged: bool,
+    witness: Point,
+    witness_on: String,
+    a_to_b: Bounds,
+    b_to_a: Bounds,
+    cuts: u64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Bounds {
+    lower: f64,
+    upper: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Threshold {
+    value: f64,
+    of: String,
+    distance: f64,
+    exceeded: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CompareSeconds {
+    read: f64,
+    distance: f64,
+    certify: f64,
+    draw: f64,
+    total: f64,
 }
 
 #[derive(Deserialize)]
@@ -207,7 +322,7 @@ fn simplify_prints_one_object_with_the_documented_fields() {
         assert_eq!((s.command.as_str(), method.starts_with(&s.method)), ("simplify", true));
         assert!(["target", "error", "passes", "no_legal_collapse", "cancelled"].contains(&s.stop.as_str()));
         let t = &s.seconds;
-        let parts = [t.read, t.build, t.simplify, t.write];
+        let parts = [t.read, t.build, t.simplify, t.measure, t.write];
         assert!(parts.iter().all(|&x| x >= 0.0) && parts.iter().sum::<f64>() <= t.total + 1e-3);
         assert!(s.faces_out < s.faces_in && s.vertices_out > 0 && s.aif_bytes > 0);
         assert!(!s.levels.is_empty() && s.levels.last().is_some_and(|l| l.faces == s.faces_out));
@@ -291,14 +406,42 @@ fn convert_and_generate_print_one_object_with_the_documented_fields() {
 }
 
 #[test]
+fn compare_prints_one_object_with_the_documented_fields() {
+    let p = Place::new();
+    p.generate("torus", "a.obj", 600);
+    p.done("simplify a.obj b.obj --ratio 0.5 -q");
+    let plain: Compare = serde_json::from_str(&p.done("compare a.obj b.obj --json").stdout).unwrap();
+    assert_eq!((plain.command.as_str(), plain.samples, plain.seed), ("compare", 300_000, 1));
+    assert!(
+        plain.certified.is_none() && plain.threshold.is_none() && plain.triangles[0] > plain.triangles[1]
+    );
+    let run = p.done("compare a.obj b.obj --json --certify 1e-3 --threshold 9 --samples 50 --seed 2");
+    let full: Compare = serde_json::from_str(&run.stdout).unwrap();
+    let (proof, threshold) = (full.certified.unwrap(), full.threshold.unwrap());
+    assert!(proof.lower <= proof.upper && proof.converged && proof.tolerance == 1e-3);
+    assert!(full.worse.max <= proof.upper && plain.worse.max <= proof.upper);
+    assert_eq!(
+        (threshold.of.as_str(), threshold.distance, threshold.exceeded),
+        ("certified", proof.upper, false)
+    );
+    assert!(["a", "b"].contains(&proof.witness_on.as_str()));
+    let t = &full.seconds;
+    assert!(t.read + t.distance + t.certify + t.draw <= t.total + 1e-3);
+}
+
+#[test]
 fn every_field_is_documented() {
     let documentation = include_str!("../docs/json.md");
     let p = Place::new();
     p.generate("quad-sphere", "in.obj", 96);
     p.generate("torus", "torus.obj", 96);
-    let simplified = p.done("simplify torus.obj out.obj --ratio 0.5 --json").json();
-    let others =
-        ["info in.obj --json", "convert in.obj out.ply --json", "generate sphere s.ply --faces 20 --json"];
+    let simplified = p.done("simplify torus.obj out.obj --max-error 0.1 --certified --measure --json").json();
+    let others = [
+        "info in.obj --json",
+        "compare torus.obj out.obj --certify 1e-2 --threshold 1 --samples 100 --json",
+        "convert in.obj out.ply --json",
+        "generate sphere s.ply --faces 20 --json",
+    ];
     for object in others.map(|a| p.done(a).json()).into_iter().chain([simplified]) {
         let mut values = vec![&object];
         while let Some(v) = values.pop() {

@@ -140,7 +140,11 @@ impl Args {
                     "certified" => "cannot be proven to be below",
                     _ => "is above",
                 };
-                let kind = if t.of == "certified" { "the proven upper bound" } else { "the largest sampled distance" };
+                let kind = if t.of == "certified" {
+                    "the proven upper bound"
+                } else {
+                    "the largest sampled distance"
+                };
                 Err(Failure::Missed(format!(
                     "{}: {kind}, {}, {} the threshold {}",
                     names[1],
@@ -192,7 +196,11 @@ impl Args {
             b_to_a: Side { distance: (&d.b_to_a.summary).into(), farthest: (&d.b_to_a.farthest).into() },
             worse: (&d.worse).into(),
             relative: d.relative().as_ref().map(Numbers::from),
-            certified: found.certified.as_ref().zip(self.certify).map(|(c, tolerance)| Proof::new(c, tolerance)),
+            certified: found
+                .certified
+                .as_ref()
+                .zip(self.certify)
+                .map(|(c, tolerance)| Proof::new(c, tolerance)),
             threshold,
             seconds,
             peak_bytes: files::peak_bytes(),

@@ -54,7 +54,12 @@ pub(crate) struct Heat<'a> {
 
 impl Heat<'_> {
     /// Writes all targets, each all or nothing.
-    pub(crate) fn write(&self, targets: &[Target], interrupt: &Interrupt, warnings: &mut Warnings) -> Result<(), Failure> {
+    pub(crate) fn write(
+        &self,
+        targets: &[Target],
+        interrupt: &Interrupt,
+        warnings: &mut Warnings,
+    ) -> Result<(), Failure> {
         let mut scale = self.found.heat_scale();
         scale.top = self.top.unwrap_or(scale.top);
         let mut drawn = None;

@@ -38,7 +38,8 @@ impl Comparison {
             });
             table.row(cells);
         }
-        let both = |x: [usize; 2]| ["", "", ""].map(String::from).into_iter().zip(x.map(thousands)).map(|(_, t)| t);
+        let both =
+            |x: [usize; 2]| ["", "", ""].map(String::from).into_iter().zip(x.map(thousands)).map(|(_, t)| t);
         let counts = |name: &str, x: [usize; 2]| {
             let mut cells = vec![name.to_string()];
             cells.extend(both(x));
@@ -52,7 +53,8 @@ impl Comparison {
 
     fn certified_table(&self) -> Option<Table> {
         let c = self.certified.as_ref()?;
-        let mut table = Table::new(&["proven largest distance", "A to B", "B to A", "two-sided", "/ diagonal"]);
+        let mut table =
+            Table::new(&["proven largest distance", "A to B", "B to A", "two-sided", "/ diagonal"]);
         let d = self.distances.diagonal;
         let rows = [
             ("at least", [c.a_to_b.lower, c.b_to_a.lower, c.lower]),

@@ -68,7 +68,8 @@ mod tests {
     fn lightness_rises_and_equal_steps_look_equal() {
         let labs: Vec<_> = (0..=64).map(|i| lab(heat_color(i as f64 / 64.0))).collect();
         assert!(labs.windows(2).all(|w| w[1][0] > w[0][0]));
-        let step = |k: usize| -> f64 { (0..3).map(|c| (labs[k + 4][c] - labs[k][c]).powi(2)).sum::<f64>().sqrt() };
+        let step =
+            |k: usize| -> f64 { (0..3).map(|c| (labs[k + 4][c] - labs[k][c]).powi(2)).sum::<f64>().sqrt() };
         let steps: Vec<f64> = (0..=60).step_by(4).map(step).collect();
         let mean = steps.iter().sum::<f64>() / steps.len() as f64;
         assert!(steps.iter().all(|s| (s / mean - 1.0).abs() < 0.12), "{steps:?}");

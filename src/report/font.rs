@@ -211,11 +211,17 @@ mod tests {
         for size in [1.0, 1.5, 2.0, 3.0] {
             let mut p = Picture::new(100, 60, [255; 3]);
             write(&mut p, 10.0, 10.0, size, "Mg", [0; 3]);
-            let inked: Vec<_> = (0..6000).map(|i| (i % 100, i / 100)).filter(|&(x, y)| p.pixel(x, y) != Some([255; 3])).collect();
+            let inked: Vec<_> = (0..6000)
+                .map(|i| (i % 100, i / 100))
+                .filter(|&(x, y)| p.pixel(x, y) != Some([255; 3]))
+                .collect();
             let (right, bottom) = (10.0 + width("Mg", size), 10.0 + 9.0 * size);
             assert!(inked.len() > 20);
             for (x, y) in inked {
-                assert!(x >= 9 && (x as f64) < right + 1.0 && y >= 9 && (y as f64) < bottom + 1.0, "{size} {x} {y}");
+                assert!(
+                    x >= 9 && (x as f64) < right + 1.0 && y >= 9 && (y as f64) < bottom + 1.0,
+                    "{size} {x} {y}"
+                );
             }
         }
         assert_eq!((width("", 2.0), width("ab", 2.0), cap_height(2.0)), (0.0, 22.0, 14.0));

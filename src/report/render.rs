@@ -75,7 +75,9 @@ pub fn render_painted(
     let (large, samples) = enlarged(view, style);
     // Of every sample: how light it is, and where.
     let mut seen: Vec<Option<(f32, DVec3)>> = vec![None; large.width() as usize * large.height() as usize];
-    draw(surface, &large, style, [FLAT_AMBIENT, FLAT_LAMP], |f, _, shade| seen[f.index] = Some((shade as f32, f.point)));
+    draw(surface, &large, style, [FLAT_AMBIENT, FLAT_LAMP], |f, _, shade| {
+        seen[f.index] = Some((shade as f32, f.point))
+    });
 
     let across = large.width() as usize;
     let n = samples as usize;
@@ -225,7 +227,15 @@ fn project(surface: &Surface, view: &View, smooth: bool, mut draw: impl FnMut(us
         for (k, (s, point)) in [a, b, c].into_iter().zip(world).enumerate() {
             let normal = own.map(|n| n[k].as_dvec3()).and_then(DVec3::try_normalize);
             let normal = normal.map_or(flat, |n| view.direction(n));
-            polygon.push(Corner { x: s.x, y: s.y, w: s.w, z: s.z, normal, point, edge: t.edges >> k & 1 == 1 });
+            polygon.push(Corner {
+                x: s.x,
+                y: s.y,
+                w: s.w,
+                z: s.z,
+                normal,
+                point,
+                edge: t.edges >> k & 1 == 1,
+            });
         }
         clip(&mut polygon, &mut scratch, view);
         let spot = |c: &Corner, edge: bool| Spot {

@@ -146,7 +146,12 @@ fn found(s: &Summary) -> String {
         text += &format!("; measured: max {}, rms {}, mean {}", short(m.max), short(m.rms), short(m.mean));
     }
     if let Some(c) = s.certified {
-        text += &format!("; proven: at most {} (asked for {}, {})", short(c.upper), short(c.bound), count(c.runs, "run"));
+        text += &format!(
+            "; proven: at most {} (asked for {}, {})",
+            short(c.upper),
+            short(c.bound),
+            count(c.runs, "run")
+        );
     }
     text
 }

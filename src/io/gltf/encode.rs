@@ -27,7 +27,9 @@ pub fn encode(scene: &Scene, format: Format, options: &EncodeOptions) -> Result<
     if let (Some(_), Value::Object(document)) = (&scene.gltf, &mut document) {
         images::place(document, scene, &mut writer);
     }
-    if let Some(Value::Object(first)) = document.pointer_mut("/scenes/0").filter(|_| !options.facts.is_empty()) {
+    if let Some(Value::Object(first)) =
+        document.pointer_mut("/scenes/0").filter(|_| !options.facts.is_empty())
+    {
         let extras = first.entry("extras").or_insert_with(|| json!({}));
         if let Value::Object(extras) = extras {
             extras.extend(options.facts.iter().cloned());

@@ -368,7 +368,13 @@ impl Sink {
     }
 }
 
-fn write(input: &MeshInput, textures: &Textures, plan: &Plan<'_>, comments: Vec<String>, mut sink: Sink) -> Vec<u8> {
+fn write(
+    input: &MeshInput,
+    textures: &Textures,
+    plan: &Plan<'_>,
+    comments: Vec<String>,
+    mut sink: Sink,
+) -> Vec<u8> {
     let longest = faces(input).map(|f| f.len()).max().unwrap_or(0);
     let count = |n: usize| if n <= 255 { Type::U8 } else { Type::U32 };
     let index = if input.positions.len() <= i32::MAX as usize { Type::I32 } else { Type::U32 };
