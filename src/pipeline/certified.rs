@@ -131,6 +131,7 @@ impl Search<'_> {
         job.options.triangles = triangles;
         job.options.max_error = match (triangles, self.job.options.max_error) {
             (None, Some(mut e)) => {
+                job.options.triangles = super::target(&self.job.options, &[self.scene.unique_triangles()], false);
                 e.value *= ESTIMATE;
                 Some(e)
             }
