@@ -1,9 +1,10 @@
 //! As few triangles as a proven bound of the distance allows: a search over runs of the method.
 
 use super::{Job, JobError, Part, Proven, Summary, run, scale};
+use crate::aif::{Bits, Weld};
 use crate::compare::{CompareError, Flattened};
 use crate::scene::Scene;
-use crate::simplify::measure::{CertifyOptions, MeasureError, Within, within};
+use crate::simplify::measure::{CertifyOptions, MeasureError, Within, vertex_distances, within};
 use crate::simplify::{Control, Stop};
 use std::time::Instant;
 
@@ -17,7 +18,13 @@ const NEAR: f64 = 0.005;
 /// The estimate that the first run stops at, of the bound: the largest distance of quadric results is about twice their largest estimate.
 const ESTIMATE: f64 = 0.5;
 /// Runs that a search takes, about; for the progress bar.
-const RUNS: f64 = 9.0;
+const RUNS: f64 = 12.0;
+/// Where a run fails at a few places only (a thin fold that a quadric does not see is enough), the vertices there are kept and it runs
+/// again, at most so often in a search: on bunny and dragon such places would cost half of all triangles.
+const MENDS: usize = 6;
+/// One vertex of so many may be kept, and `SPARE` more.
+const KEPT: usize = 1000;
+const SPARE: usize = 16;
 
 /// A result that passed.
 struct Passed {
@@ -36,7 +43,22 @@ pub(super) fn simplify(
     let bound = job.options.max_error.ok_or(JobError::NoBound)?;
     let bound = if bound.relative { bound.value * scale::world_diagonal(&scene) } else { bound.value };
     let all = scene.unique_triangles();
-    let mut search = Search { scene: &scene, input, job, control, bound, runs: 0, seconds: [0.0; 3] };
+    // Vertices of the scene are those of its mesh only where there is one, which is not welded.
+    let vertices = scene.meshes.first().map_or(0, |m| m.geometry.positions.len());
+    let single = scene.meshes.len() == 1 && vertices == input.positions.len() && job.weld == Weld::No;
+    let may_keep = if single { vertices / KEPT + SPARE } else { 0 };
+    let mut search = Search {
+        scene: &scene,
+        input,
+        job,
+        control,
+        bound,
+        kept: Bits::new(if single { vertices } else { 0 }),
+        may_keep,
+        mends: 0,
+        runs: 0,
+        seconds: [0.0; 3],
+    };
     // Targets of the job end the search from below.
     let floor = super::target(&job.options, &[all], false).unwrap_or(1).clamp(1, all);
 
@@ -114,6 +136,11 @@ struct Search<'a> {
     job: &'a Job,
     control: &'a dyn Control,
     bound: f64,
+    /// Vertices that runs do not touch.
+    kept: Bits,
+    /// How many these may become.
+    may_keep: usize,
+    mends: usize,
     runs: usize,
     /// Building, simplifying, measuring.
     seconds: [f64; 3],
@@ -122,51 +149,108 @@ struct Search<'a> {
 /// The bound that was proven, if it was; what came of the run.
 type Probe = (Option<f64>, Summary, Scene);
 
+/// What became of a result.
+enum Verdict {
+    /// Its distance is proven to be at most this.
+    Passed(f64),
+    /// It is not; these vertices of the input are at the places where, as far as is known.
+    Failed(Vec<u32>),
+}
+
 impl Search<'_> {
-    /// One run to this many triangles, or by the estimate; `None` when cancelled.
+    /// A run to this many triangles, or by the estimate, and again where keeping a few vertices may help; `None` when cancelled.
     fn probe(&mut self, triangles: Option<usize>) -> Result<(Option<usize>, Option<Probe>), JobError> {
+        loop {
+            let Some((scene, summary)) = self.run_once(triangles)? else { return Ok((triangles, None)) };
+            let now = Instant::now();
+            let [start, share] = self.share();
+            let control = Part::new(self.control, start + 0.5 * share, 0.5 * share);
+            let verdict = match self.judge(&scene, &control) {
+                Err(CompareError::Measure(MeasureError::Cancelled)) => return Ok((triangles, None)),
+                verdict => verdict?,
+            };
+            self.seconds[2] += now.elapsed().as_secs_f64();
+            let upper = match verdict {
+                Verdict::Passed(upper) => Some(upper),
+                Verdict::Failed(places) if self.keep(&places) => continue,
+                Verdict::Failed(_) => None,
+            };
+            return Ok((triangles, Some((upper, summary, scene))));
+        }
+    }
+
+    /// The part of the progress that the present run has.
+    fn share(&self) -> [f64; 2] {
+        let start = (self.runs.saturating_sub(1) as f64 / RUNS).min(0.95);
+        [start, (1.0 / RUNS).min(0.99 - start)]
+    }
+
+    fn run_once(&mut self, triangles: Option<usize>) -> Result<Option<(Scene, Summary)>, JobError> {
         let mut job = self.job.clone();
         (job.certified, job.measure, job.per_mesh) = (false, false, false);
         job.options.ratio = None;
         job.options.triangles = triangles;
         job.options.max_error = match (triangles, self.job.options.max_error) {
             (None, Some(mut e)) => {
-                job.options.triangles = super::target(&self.job.options, &[self.scene.unique_triangles()], false);
+                job.options.triangles =
+                    super::target(&self.job.options, &[self.scene.unique_triangles()], false);
                 e.value *= ESTIMATE;
                 Some(e)
             }
             _ => None,
         };
-        let start = (self.runs as f64 / RUNS).min(0.95);
-        let share = (1.0 / RUNS).min(0.99 - start);
+        if self.mends > 0 {
+            let given = &job.options.locked_vertices;
+            let mut locked = self.kept.clone();
+            let also = (0..self.input.positions.len()).filter(|&v| given.get(v));
+            also.for_each(|v| locked.set(v));
+            job.options.locked_vertices = locked;
+        }
         self.runs += 1;
-        let (scene, summary) = run(self.scene.clone(), &job, &Part::new(self.control, start, 0.5 * share))?;
+        let [start, share] = self.share();
+        let part = Part::new(self.control, start, 0.5 * share);
+        let (scene, summary) = run(self.scene.clone(), &job, &part)?;
         self.seconds[0] += summary.build_seconds;
         self.seconds[1] += summary.simplify_seconds;
-        if summary.stop == Stop::Cancelled {
-            return Ok((triangles, None));
-        }
-        let now = Instant::now();
-        let control = Part::new(self.control, start + 0.5 * share, 0.5 * share);
-        let upper = match self.proven(&scene, &control) {
-            Err(CompareError::Measure(MeasureError::Cancelled)) => return Ok((triangles, None)),
-            upper => upper?,
-        };
-        self.seconds[2] += now.elapsed().as_secs_f64();
-        Ok((triangles, Some((upper, summary, scene))))
+        Ok((summary.stop != Stop::Cancelled).then_some((scene, summary)))
     }
 
-    /// A bound of the distance, at most the one asked for; `None` if there is none.
-    fn proven(&self, result: &Scene, control: &dyn Control) -> Result<Option<f64>, CompareError> {
+    /// Keeps these vertices from now on, if they are few.
+    fn keep(&mut self, places: &[u32]) -> bool {
+        let new = places.iter().filter(|&&v| !self.kept.get(v as usize)).count();
+        if new == 0 || self.mends >= MENDS || self.kept.count() + new > self.may_keep {
+            return false;
+        }
+        self.mends += 1;
+        places.iter().for_each(|&v| self.kept.set(v as usize));
+        true
+    }
+
+    fn judge(&self, result: &Scene, control: &dyn Control) -> Result<Verdict, CompareError> {
         let result = match Flattened::of(result) {
-            Err(CompareError::Measure(MeasureError::NoTriangle)) => return Ok(None),
+            Err(CompareError::Measure(MeasureError::NoTriangle)) => return Ok(Verdict::Failed(vec![])),
             result => result?,
         };
+        if self.mends < MENDS && self.may_keep > 0 {
+            let distances =
+                vertex_distances(&self.input.surface, &result.surface, &Part::new(control, 0.0, 0.3))?;
+            let far: Vec<u32> =
+                (0..).zip(&distances).filter(|(_, d)| **d > self.bound).map(|(v, _)| v).collect();
+            if !far.is_empty() {
+                return Ok(Verdict::Failed(far));
+            }
+        }
         let mut options = CertifyOptions::with_tolerance(NEAR * self.bound);
         options.threads = self.job.options.threads;
-        Ok(match within(&self.input.surface, &result.surface, self.bound, &options, control)? {
-            Within::Yes { upper } => Some(upper),
-            _ => None,
+        let control = Part::new(control, 0.3, 0.7);
+        Ok(match within(&self.input.surface, &result.surface, self.bound, &options, &control)? {
+            Within::Yes { upper } => Verdict::Passed(upper),
+            Within::No { witness, on_a } => {
+                let triangle = if on_a { witness.triangle } else { witness.closest_triangle };
+                let corners = self.input.triangles.get(triangle as usize);
+                Verdict::Failed(corners.map_or_else(Vec::new, |t| t.to_vec()))
+            }
+            Within::Open { .. } => Verdict::Failed(vec![]),
         })
     }
 
