@@ -2,20 +2,26 @@
 //!
 //! This is what `progmesh compare` does between reading and printing; on arrays of your own use [`crate::simplify::measure`] directly.
 
-use crate::aif::{BuildError, MeshInput, Positions, triangulate_polygon};
+use crate::aif::{
+    BuildError, BuildOptions, Channel, Mesh, MeshInput, NONE, Positions, Semantic, triangulate_polygon,
+};
 use crate::io::flatten::flatten;
 use crate::pipeline::Part;
 use crate::report::{Scale, SurfaceError, short};
 use crate::scene::Scene;
 use crate::simplify::Control;
 use crate::simplify::measure::{
-    Certified, CertifyOptions, DistanceOptions, Distances, MeasureError, Surface, certify, distance,
+    Certified, CertifyOptions, CornerValues, Deviations, DistanceOptions, Distances, MeasureError,
+    SelfIntersections, Surface, TopologySummary, TriangleQuality, certify, deviations, distance,
+    self_intersections, triangle_quality, turned_triangles,
 };
 use glam::DVec3;
 use std::time::Instant;
 
 mod heat;
 mod tables;
+
+pub use tables::semantic_name;
 
 pub use heat::{DISTANCE, Pair, heat_page, heat_picture, heat_scene};
 
@@ -27,6 +33,8 @@ pub struct CompareOptions {
     pub distance: DistanceOptions,
     /// Prove the two-sided distance to within this, a part of the diagonal of A.
     pub certify: Option<f64>,
+    /// Measure distances alone: no [`Details`].
+    pub distance_only: bool,
 }
 
 /// Why nothing was compared.
@@ -55,6 +63,10 @@ pub struct Flattened {
     pub positions: Positions,
     /// The triangles; polygons are cut.
     pub triangles: Vec<[u32; 3]>,
+    /// Texture coordinates and colours of the triangles' corners.
+    pub values: Vec<CornerValues>,
+    /// Its topology, if it was counted.
+    pub topology: Option<TopologySummary>,
 }
 
 impl Flattened {
@@ -67,35 +79,65 @@ impl Flattened {
             m.geometry.validate().map_err(failed)?;
         }
         let flat = flatten(scene, "a comparison");
-        let triangles = triangles(&flat.geometry);
+        let corners = triangles(&flat.geometry);
+        let triangles: Vec<_> =
+            corners.iter().map(|t| t.map(|c| flat.geometry.corners[c as usize])).collect();
         let surface = Surface::new(&flat.geometry.positions, &triangles)?;
+        let values = values(&flat.geometry, &corners)?;
         let positions = flat.geometry.into_owned().positions;
-        Ok(Flattened { surface, positions, triangles })
+        Ok(Flattened { surface, positions, triangles, values, topology: None })
+    }
+
+    /// The same with its topology counted, as one mesh: instances that touch stay apart.
+    pub fn with_topology(scene: &Scene) -> Result<Flattened, CompareError> {
+        let mut flattened = Flattened::of(scene)?;
+        let input = flatten(scene, "a comparison").geometry.into_owned();
+        let failed = |source| CompareError::Mesh { mesh: String::new(), source };
+        let (mesh, _) = Mesh::build(input, &BuildOptions::default()).map_err(failed)?;
+        flattened.topology = Some(TopologySummary::of(&mesh));
+        Ok(flattened)
     }
 }
 
-/// All faces as triangles, in order.
+/// All faces as triangles of corner slots, in order.
 fn triangles(input: &MeshInput) -> Vec<[u32; 3]> {
-    let Some(sizes) = &input.face_sizes else {
-        return input.corners.as_chunks().0.to_vec();
-    };
-    let mut out = Vec::with_capacity(input.corners.len());
+    let mut out = Vec::with_capacity(input.corners.len() / 2);
     let (mut points, mut cut): (Vec<DVec3>, _) = (Vec::new(), Vec::new());
-    let mut rest = &input.corners[..];
-    for &n in sizes {
-        let (corners, after) = rest.split_at((n as usize).min(rest.len()));
-        rest = after;
-        if let [a, b, c] = corners {
-            out.push([*a, *b, *c]);
-            continue;
+    let mut start = 0;
+    for f in 0..input.face_count() {
+        let n = input.face_sizes.as_ref().map_or(3, |s| s[f]);
+        if n == 3 {
+            out.push([start, start + 1, start + 2]);
+        } else {
+            let corners = &input.corners[start as usize..(start + n) as usize];
+            points.clear();
+            points.extend(corners.iter().map(|&v| input.positions.get(v as usize)));
+            cut.clear();
+            triangulate_polygon(&points, &mut cut);
+            out.extend(cut.iter().map(|t| t.map(|i| start + i)));
         }
-        points.clear();
-        points.extend(corners.iter().map(|&v| input.positions.get(v as usize)));
-        cut.clear();
-        triangulate_polygon(&points, &mut cut);
-        out.extend(cut.iter().map(|t| t.map(|i| corners[i as usize])));
+        start += n;
     }
     out
+}
+
+/// Texture coordinates and colours of triangles of corner slots.
+fn values(input: &MeshInput, triangles: &[[u32; 3]]) -> Result<Vec<CornerValues>, MeasureError> {
+    let Some(wedges) = &input.wedges else { return Ok(vec![]) };
+    let compared = |s: &Semantic| matches!(s, Semantic::TexCoord(_) | Semantic::Color(_));
+    let channels = wedges.channels().iter().enumerate().filter(|(_, c)| compared(&c.semantic));
+    let of_channel = |(k, c): (usize, &Channel)| {
+        let mut values = Vec::with_capacity(3 * c.width * triangles.len());
+        for &corner in triangles.as_flattened() {
+            let wedge = wedges.corner.get(corner as usize).copied().unwrap_or(NONE);
+            match wedges.get(wedge, k) {
+                Some(row) => values.extend_from_slice(row),
+                None => values.extend(std::iter::repeat_n(f32::NAN, c.width)),
+            }
+        }
+        CornerValues::new(c.semantic.clone(), c.width, values)
+    };
+    channels.map(of_channel).collect()
 }
 
 /// Two scenes compared. Lengths are in model units unless a name says otherwise.
@@ -108,10 +150,46 @@ pub struct Comparison {
     pub distances: Distances,
     /// The proven two-sided distance, if asked for.
     pub certified: Option<Certified>,
+    /// Everything else, unless distances alone were asked for.
+    pub details: Option<Details>,
     /// Seconds that sampling took.
     pub distance_seconds: f64,
     /// Seconds that the proof took.
     pub certify_seconds: f64,
+    /// Seconds that everything else took.
+    pub detail_seconds: f64,
+}
+
+/// What else differs between two surfaces.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Details {
+    /// Of normals, texture coordinates and colours, at closest points.
+    pub deviations: Deviations,
+    /// Of A and of B, where it was counted.
+    pub topology: [Option<TopologySummary>; 2],
+    /// Triangles of B that face the other way than A there.
+    pub turned: usize,
+    /// Shapes of the triangles of A and of B.
+    pub quality: [TriangleQuality; 2],
+    /// Triangles of B that meet where they should not.
+    pub self_intersections: SelfIntersections,
+}
+
+fn details(
+    a: &Flattened,
+    b: &Flattened,
+    options: &DistanceOptions,
+    control: &dyn Control,
+) -> Result<Details, MeasureError> {
+    let part = |start, share| Part::new(control, start, share);
+    Ok(Details {
+        deviations: deviations((&a.surface, &a.values), (&b.surface, &b.values), options, &part(0.0, 0.7))?,
+        topology: [a.topology, b.topology],
+        turned: turned_triangles(&a.surface, &b.surface, &part(0.7, 0.2))?.len(),
+        quality: [a, b].map(|s| triangle_quality(&s.surface)),
+        self_intersections: self_intersections(&b.surface, &part(0.9, 0.1))?,
+    })
 }
 
 /// Compares B with A.
@@ -123,26 +201,35 @@ pub fn compare(
     options: &CompareOptions,
     control: &dyn Control,
 ) -> Result<Comparison, CompareError> {
-    // Proving takes about as long as sampling, more or less.
-    let half = if options.certify.is_some() { 0.5 } else { 1.0 };
+    // Each of the three takes about as long as the others, more or less.
+    let parts = 1.0 + f64::from(options.certify.is_some()) + f64::from(!options.distance_only);
+    let part = |k: f64| Part::new(control, k / parts, 1.0 / parts);
     let start = Instant::now();
-    let distances = distance(&a.surface, &b.surface, &options.distance, &Part::new(control, 0.0, half))?;
+    let distances = distance(&a.surface, &b.surface, &options.distance, &part(0.0))?;
     let distance_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let certified = match options.certify {
         Some(tolerance) => {
             let mut how = CertifyOptions::with_tolerance(tolerance * a.surface.diagonal());
             how.threads = options.distance.threads;
-            Some(certify(&a.surface, &b.surface, &how, &Part::new(control, half, 1.0 - half))?)
+            Some(certify(&a.surface, &b.surface, &how, &part(1.0))?)
         }
         None => None,
+    };
+    let certify_seconds = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let details = match options.distance_only {
+        true => None,
+        false => Some(details(a, b, &options.distance, &part(parts - 1.0))?),
     };
     Ok(Comparison {
         triangles: [a, b].map(|s| s.surface.triangle_count()),
         distances,
         certified,
         distance_seconds,
-        certify_seconds: start.elapsed().as_secs_f64(),
+        details,
+        certify_seconds,
+        detail_seconds: start.elapsed().as_secs_f64(),
     })
 }
 

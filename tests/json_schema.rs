@@ -90,6 +90,8 @@ struct Compare {
     certified: Option<Proof>,
     #[serde(deserialize_with = "present")]
     threshold: Option<Threshold>,
+    #[serde(deserialize_with = "present")]
+    details: Option<Details>,
     seconds: CompareSeconds,
     #[serde(deserialize_with = "present")]
     peak_bytes: Option<u64>,
@@ -137,6 +139,79 @@ struct Point {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct Details {
+    normals: TwoSided,
+    attributes: Vec<Deviating>,
+    topology: Both<Option<Topology>>,
+    turned_triangles: usize,
+    quality: Both<Quality>,
+    self_intersections: Intersections,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Both<T> {
+    a: T,
+    b: T,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TwoSided {
+    a_to_b: Deviation,
+    b_to_a: Deviation,
+    worse: Deviation,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Deviating {
+    name: String,
+    a_to_b: Deviation,
+    b_to_a: Deviation,
+    worse: Deviation,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Deviation {
+    rms: f64,
+    max: f64,
+    samples: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Topology {
+    components: usize,
+    border_loops: usize,
+    #[serde(deserialize_with = "present")]
+    genus: Option<usize>,
+    euler: i64,
+    non_manifold_edges: usize,
+    cut_vertices: usize,
+    misoriented_edges: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Quality {
+    mean: f64,
+    max: f64,
+    quantiles: Quantiles,
+    degenerate: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Intersections {
+    pairs: u64,
+    some: Vec<[u32; 2]>,
+    degenerate: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Proof {
     lower: f64,
     upper: f64,
@@ -171,6 +246,7 @@ struct CompareSeconds {
     read: f64,
     distance: f64,
     certify: f64,
+    details: f64,
     draw: f64,
     total: f64,
 }
@@ -415,8 +491,17 @@ fn compare_prints_one_object_with_the_documented_fields() {
     assert!(
         plain.certified.is_none() && plain.threshold.is_none() && plain.triangles[0] > plain.triangles[1]
     );
-    let run = p.done("compare a.obj b.obj --json --certify 1e-3 --threshold 9 --samples 50 --seed 2");
+    let d = plain.details.unwrap();
+    let [ta, tb] = [d.topology.a.unwrap(), d.topology.b.unwrap()];
+    assert_eq!((ta.genus, tb.genus, ta.euler, tb.components), (Some(1), Some(1), 0, 1));
+    assert!(d.attributes.iter().any(|a| a.name == "uv 0") && d.normals.worse.rms > 0.0);
+    assert_eq!((d.turned_triangles, d.self_intersections.pairs, d.quality.b.degenerate), (0, 0, 0));
+    assert!(d.quality.a.mean >= 1.15 && d.quality.a.max >= d.quality.a.quantiles.p999);
+    let run = p.done(
+        "compare a.obj b.obj --json --certify 1e-3 --threshold 9 --samples 50 --seed 2 --distance-only",
+    );
     let full: Compare = serde_json::from_str(&run.stdout).unwrap();
+    assert!(full.details.is_none());
     let (proof, threshold) = (full.certified.unwrap(), full.threshold.unwrap());
     assert!(proof.lower <= proof.upper && proof.converged && proof.tolerance == 1e-3);
     assert!(full.worse.max <= proof.upper && plain.worse.max <= proof.upper);
@@ -426,7 +511,7 @@ fn compare_prints_one_object_with_the_documented_fields() {
     );
     assert!(["a", "b"].contains(&proof.witness_on.as_str()));
     let t = &full.seconds;
-    assert!(t.read + t.distance + t.certify + t.draw <= t.total + 1e-3);
+    assert!(t.read + t.distance + t.certify + t.details + t.draw <= t.total + 1e-3);
 }
 
 #[test]

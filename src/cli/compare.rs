@@ -7,10 +7,12 @@ use super::{Failure, heatmap};
 use progmesh::compare::{CompareError, CompareOptions, Comparison, Flattened, compare};
 use progmesh::io::files;
 use progmesh::scene::Scene;
-use progmesh::simplify::measure::{Certified, Farthest, Interval, MeasureError, Summary};
+use progmesh::simplify::measure::{self, Certified, Farthest, Interval, MeasureError, Summary};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+mod details;
 
 /// Measure how far two meshes are from each other, in both directions.
 ///
@@ -49,6 +51,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "TOL", value_parser = args::fraction, allow_negative_numbers = true,
           help_heading = "Distance")]
     certify: Option<f64>,
+
+    /// Measure distances alone: not normals, texture coordinates, colours, topology, triangle shapes and self-intersections
+    #[arg(long, help_heading = "Distance")]
+    distance_only: bool,
 
     /// Exit with 1 if the largest distance exceeds this: the proven upper bound with --certify, the largest sampled one without
     #[arg(long, value_name = "E", value_parser = args::not_negative, allow_negative_numbers = true,
@@ -97,6 +103,7 @@ impl Args {
             options.distance.samples = self.samples;
             options.distance.seed = self.seed;
             options.certify = self.certify;
+            options.distance_only = self.distance_only;
             let progress = Progress::new(&interrupt, self.quiet, "measuring");
             let found = compare(&a, &b, &options, &progress).map_err(|e| failure(&names[0], e))?;
             drop(progress);
@@ -119,6 +126,7 @@ impl Args {
                 read,
                 distance: found.distance_seconds,
                 certify: found.certify_seconds,
+                details: found.detail_seconds,
                 draw: drawing.elapsed().as_secs_f64(),
                 total: start.elapsed().as_secs_f64(),
             };
@@ -163,7 +171,11 @@ impl Args {
         let from = self.from.filter(|_| files::is_dash(path) || !named);
         let scene = common::read(path, from, warnings)?.decoded.scene;
         let file = common::name(path, "standard input");
-        let flattened = Flattened::of(&scene).map_err(|e| failure(&file, e))?;
+        let flattened = match self.distance_only {
+            true => Flattened::of(&scene),
+            false => Flattened::with_topology(&scene),
+        };
+        let flattened = flattened.map_err(|e| failure(&file, e))?;
         Ok((scene, flattened))
     }
 
@@ -202,6 +214,7 @@ impl Args {
                 .zip(self.certify)
                 .map(|(c, tolerance)| Proof::new(c, tolerance)),
             threshold,
+            details: found.details.as_ref().map(details::Report::from),
             seconds,
             peak_bytes: files::peak_bytes(),
             warnings,
@@ -233,6 +246,7 @@ struct Report {
     relative: Option<Numbers>,
     certified: Option<Proof>,
     threshold: Option<Threshold>,
+    details: Option<details::Report>,
     seconds: Seconds,
     peak_bytes: Option<u64>,
     warnings: Vec<String>,
@@ -254,7 +268,7 @@ struct Numbers {
 }
 
 #[derive(Serialize)]
-struct Quantiles {
+pub(super) struct Quantiles {
     p50: f64,
     p90: f64,
     p95: f64,
@@ -264,9 +278,13 @@ struct Quantiles {
 
 impl From<&Summary> for Numbers {
     fn from(s: &Summary) -> Self {
-        let q = &s.quantiles;
-        let quantiles = Quantiles { p50: q.p50, p90: q.p90, p95: q.p95, p99: q.p99, p999: q.p999 };
-        Numbers { max: s.max, rms: s.rms, mean: s.mean, quantiles }
+        Numbers { max: s.max, rms: s.rms, mean: s.mean, quantiles: (&s.quantiles).into() }
+    }
+}
+
+impl From<&measure::Quantiles> for Quantiles {
+    fn from(q: &measure::Quantiles) -> Self {
+        Quantiles { p50: q.p50, p90: q.p90, p95: q.p95, p99: q.p99, p999: q.p999 }
     }
 }
 
@@ -340,6 +358,7 @@ struct Seconds {
     read: f64,
     distance: f64,
     certify: f64,
+    details: f64,
     draw: f64,
     total: f64,
 }

@@ -1,9 +1,10 @@
 //! A comparison as tables.
 
-use super::Comparison;
+use super::{Comparison, Details};
+use crate::aif::Semantic;
 use crate::pipeline::thousands;
 use crate::report::{Table, short};
-use crate::simplify::measure::{Farthest, Summary};
+use crate::simplify::measure::{Deviations, Farthest, Summary, TopologySummary, TriangleQuality};
 use glam::DVec3;
 
 impl Comparison {
@@ -12,6 +13,10 @@ impl Comparison {
         let mut tables = vec![self.distance_table()];
         tables.extend(self.certified_table());
         tables.push(self.farthest_table());
+        if let Some(d) = &self.details {
+            tables.push(deviation_table(&d.deviations));
+            tables.push(shape_table(d));
+        }
         tables
     }
 
@@ -81,6 +86,65 @@ impl Comparison {
         }
         table
     }
+}
+
+/// How people call an attribute that is compared.
+pub fn semantic_name(semantic: &Semantic) -> String {
+    match semantic {
+        Semantic::TexCoord(k) => format!("uv {k}"),
+        Semantic::Color(k) => format!("colour {k}"),
+        other => format!("{other:?}"),
+    }
+}
+
+fn deviation_table(d: &Deviations) -> Table {
+    let mut table = Table::new(&["deviation at closest points", "rms", "max"]);
+    let normals = &d.normals.worse;
+    if normals.samples > 0 {
+        table.row(["normals, degrees".into(), short(normals.rms), short(normals.max)]);
+    }
+    for (semantic, found) in d.values.iter().filter(|v| v.1.worse.samples > 0) {
+        table.row([semantic_name(semantic), short(found.worse.rms), short(found.worse.max)]);
+    }
+    table
+}
+
+fn shape_table(d: &Details) -> Table {
+    let mut table = Table::new(&["shape", "A", "B"]);
+    if let [Some(a), Some(b)] = &d.topology {
+        let count = |n: usize| thousands(n);
+        let genus = |t: &TopologySummary| t.genus.map_or("-".into(), count);
+        table.row(["components".into(), count(a.components), count(b.components)]);
+        table.row(["border loops".into(), count(a.border_loops), count(b.border_loops)]);
+        table.row(["genus".into(), genus(a), genus(b)]);
+        table.row(["Euler characteristic".into(), a.euler.to_string(), b.euler.to_string()]);
+        table.row([
+            "edges of three and more faces".into(),
+            count(a.non_manifold_edges),
+            count(b.non_manifold_edges),
+        ]);
+        table.row(["cut vertices".into(), count(a.cut_vertices), count(b.cut_vertices)]);
+        table.row([
+            "edges between faces turned against each other".into(),
+            count(a.misoriented_edges),
+            count(b.misoriented_edges),
+        ]);
+    }
+    table.row(["triangles turned against A".into(), String::new(), thousands(d.turned)]);
+    let [a, b] = &d.quality;
+    let rows: [(&str, fn(&TriangleQuality) -> f64); 4] = [
+        ("longest side / shortest altitude: mean", |q| q.mean),
+        ("50 % of the triangles below", |q| q.quantiles.p50),
+        ("99 %", |q| q.quantiles.p99),
+        ("max", |q| q.max),
+    ];
+    for (name, number) in rows {
+        table.row([name.into(), short(number(a)), short(number(b))]);
+    }
+    table.row(["triangles without area".into(), thousands(a.degenerate), thousands(b.degenerate)]);
+    let pairs = usize::try_from(d.self_intersections.pairs).unwrap_or(usize::MAX);
+    table.row(["pairs of triangles that intersect".into(), String::new(), thousands(pairs)]);
+    table
 }
 
 /// In seven digits: bounds that are close to each other differ.
