@@ -494,7 +494,12 @@ fn compare_prints_one_object_with_the_documented_fields() {
     let d = plain.details.unwrap();
     let [ta, tb] = [d.topology.a.unwrap(), d.topology.b.unwrap()];
     assert_eq!((ta.genus, tb.genus, ta.euler, tb.components), (Some(1), Some(1), 0, 1));
-    assert!(d.attributes.iter().any(|a| a.name == "uv 0") && d.normals.worse.rms > 0.0);
+    assert!(d.attributes.is_empty() && d.normals.worse.rms > 0.0);
+    p.generate("quad-sphere", "q.obj", 96);
+    let q: Compare =
+        serde_json::from_str(&p.done("compare q.obj q.obj --samples 500 --json").stdout).unwrap();
+    let uv = &q.details.as_ref().unwrap().attributes[0];
+    assert_eq!((uv.name.as_str(), uv.worse.samples), ("uv 0", 1000));
     assert_eq!((d.turned_triangles, d.self_intersections.pairs, d.quality.b.degenerate), (0, 0, 0));
     assert!(d.quality.a.mean >= 1.15 && d.quality.a.max >= d.quality.a.quantiles.p999);
     let run = p.done(

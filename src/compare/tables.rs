@@ -7,6 +7,9 @@ use crate::report::{Table, short};
 use crate::simplify::measure::{Deviations, Farthest, Summary, TopologySummary, TriangleQuality};
 use glam::DVec3;
 
+/// What a row is called, and where its numbers come from.
+type Row<T> = (&'static str, fn(&T) -> f64);
+
 impl Comparison {
     /// All measures for people. Numbers are those of the fields.
     pub fn tables(&self) -> Vec<Table> {
@@ -24,7 +27,7 @@ impl Comparison {
         let d = &self.distances;
         let mut table = Table::new(&["distance", "A to B", "B to A", "worse", "worse / diagonal"]);
         let sides = [&d.a_to_b.summary, &d.b_to_a.summary, &d.worse];
-        let numbers: [(&str, fn(&Summary) -> f64); 8] = [
+        let numbers: [Row<Summary>; 8] = [
             ("max", |s| s.max),
             ("rms", |s| s.rms),
             ("mean", |s| s.mean),
@@ -43,11 +46,9 @@ impl Comparison {
             });
             table.row(cells);
         }
-        let both =
-            |x: [usize; 2]| ["", "", ""].map(String::from).into_iter().zip(x.map(thousands)).map(|(_, t)| t);
         let counts = |name: &str, x: [usize; 2]| {
             let mut cells = vec![name.to_string()];
-            cells.extend(both(x));
+            cells.extend(x.map(thousands));
             cells.extend(["", ""].map(String::from));
             cells
         };
@@ -132,7 +133,7 @@ fn shape_table(d: &Details) -> Table {
     }
     table.row(["triangles turned against A".into(), String::new(), thousands(d.turned)]);
     let [a, b] = &d.quality;
-    let rows: [(&str, fn(&TriangleQuality) -> f64); 4] = [
+    let rows: [Row<TriangleQuality>; 4] = [
         ("longest side / shortest altitude: mean", |q| q.mean),
         ("50 % of the triangles below", |q| q.quantiles.p50),
         ("99 %", |q| q.quantiles.p99),
