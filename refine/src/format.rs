@@ -13,6 +13,7 @@ mod coder;
 mod connect;
 mod container;
 mod input_order;
+mod lattice;
 mod places;
 mod plan;
 mod read;
@@ -22,6 +23,7 @@ mod write;
 
 pub use base::MeshHead;
 pub use container::{Chunk, ChunkType, Directory, FormatError, MAGIC, VERSION};
+pub use lattice::suggested_grid;
 pub use places::Lattice;
 pub use read::{
     Assembly, ByteRanges, Decoded, Piece, PmReader, RangeReader, Report, StreamSizes, decode, decode_prefix,

@@ -8,8 +8,8 @@
 //! other step what it was there before, however it is reached; [`progmesh_aif::Mesh::check`] holds throughout; moving by
 //! one collapse takes time in proportion to the valence, and memory is one flat record of about 100 bytes a collapse.
 //!
-//! There now: the multiresolution scheme in memory, [progressive meshes](progressive) and [geomorphs](geomorph). Not there yet:
-//! progressive-mesh files and streams, view-dependent refinement; they will build on the same records.
+//! There now: the multiresolution scheme in memory, [progressive meshes](progressive), their [files and
+//! streams](format), and [geomorphs](geomorph). Not there yet: view-dependent refinement; it will build on the same records.
 //!
 //! ```
 //! use progmesh_refine::{History, simplify::{Options, Quiet}};

@@ -38,15 +38,15 @@ pub enum SplitKind {
 }
 
 impl SplitCode {
-    const TWO_FACES: u16 = 1 << 6;
-    const L_INNER: u16 = 1 << 7;
-    const L_STARTS: u16 = 1 << 8;
-    const R_INNER: u16 = 1 << 9;
-    const L_TIP_INNER: u16 = 1 << 10;
-    const R_TIP_INNER: u16 = 1 << 11;
-    const KIND: u16 = 12;
-    const MOVES: u16 = 1 << 14;
-    const ROWS: u16 = 1 << 15;
+    pub(crate) const TWO_FACES: u16 = 1 << 6;
+    pub(crate) const L_INNER: u16 = 1 << 7;
+    pub(crate) const L_STARTS: u16 = 1 << 8;
+    pub(crate) const R_INNER: u16 = 1 << 9;
+    pub(crate) const L_TIP_INNER: u16 = 1 << 10;
+    pub(crate) const R_TIP_INNER: u16 = 1 << 11;
+    pub(crate) const KIND: u16 = 12;
+    pub(crate) const MOVES: u16 = 1 << 14;
+    pub(crate) const ROWS: u16 = 1 << 15;
 
     fn flag(self, bit: u16) -> bool {
         self.0 & bit != 0

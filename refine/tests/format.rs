@@ -221,3 +221,262 @@ fn chunks_are_read_alone_and_in_any_order() {
         assert_eq!(block.bytes(), chunk.raw);
     }
 }
+
+/// A file of three meshes, a scene and all kinds of chunks; small enough to be damaged everywhere.
+fn victim() -> Vec<u8> {
+    let meshes = vec![sample("scan", 260, 1), sample("polygons", 120, 1), sample("cad", 150, 1)];
+    let all = build_all(meshes, &[1.0; 3], &Options::default(), &Quiet).unwrap();
+    encode(&all.meshes, &all.turns, b"a scene", &EncodeOptions::default()).unwrap()
+}
+
+/// Whatever was read can be walked without a panic.
+fn walk(decoded: &Decoded) {
+    for pm in &decoded.meshes {
+        let Ok(mut c) = pm.cursor() else { continue };
+        let _ = c.seek(usize::MAX);
+        let _ = c.to_ordered_input();
+        c.seek(0).unwrap();
+    }
+}
+
+/// Head and directory with their checksum set right.
+fn sign(bytes: &mut [u8]) {
+    let end = 48 + 64 * u32::from_le_bytes(bytes[24..28].try_into().unwrap()) as usize;
+    let mut h = crc32fast::Hasher::new();
+    h.update(&bytes[..44]);
+    h.update(&bytes[48..end]);
+    bytes[44..48].copy_from_slice(&h.finalize().to_le_bytes());
+}
+
+#[test]
+fn a_file_that_is_cut_off_brings_what_is_whole() {
+    let bytes = victim();
+    let directory = RangeReader::new(&bytes[..]).unwrap().directory().clone();
+    let whole = decode(&bytes).unwrap();
+    for end in 0..bytes.len() {
+        match decode_prefix(&bytes[..end]) {
+            Err(e) => assert!((end as u64) < directory.bytes(), "{end}: {e}"),
+            Ok(d) => {
+                let there = directory.chunks.iter().take_while(|c| c.range().end <= end as u64).count();
+                let Some(FormatError::Chunk { index, .. }) = d.report.damage else {
+                    panic!("{end}: no damage")
+                };
+                assert_eq!(index as usize, there, "{end}");
+                let splits = |m: u32| {
+                    let of = |c: &&Chunk| c.kind == ChunkType::SPLITS && c.mesh == m;
+                    directory.chunks[..there].iter().filter(of).map(|c| c.count as usize).sum::<usize>()
+                };
+                for (m, pm) in d.meshes.iter().enumerate() {
+                    assert_eq!(pm.splits.len(), splits(m as u32));
+                    let end = pm.splits.len();
+                    assert_eq!(pm.splits.vertex, whole.meshes[m].splits.vertex[..end]);
+                }
+                if end % 7 == 0 {
+                    walk(&d);
+                }
+                let mut r = PmReader::new(Trickle(&bytes[..end], 64)).unwrap();
+                while let Ok(Some(_)) = r.advance() {}
+                assert_eq!(r.finish(), d);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_flipped_bit_is_an_error_that_names_its_chunk() {
+    let bytes = victim();
+    let directory = RangeReader::new(&bytes[..]).unwrap().directory().clone();
+    for at in 0..bytes.len() {
+        let mut bad = bytes.clone();
+        bad[at] ^= 1 << (at % 8);
+        let hit = directory.chunks.iter().find(|c| c.range().contains(&(at as u64)));
+        match (decode(&bad), hit) {
+            (Err(FormatError::Chunk { index, kind, .. }), Some(c)) => {
+                assert_eq!((index, kind), (c.index, c.kind))
+            }
+            (Err(FormatError::Chunk { .. }) | Ok(_), None) | (Ok(_), Some(_)) => panic!("byte {at} passes"),
+            (Err(_), None) => {}
+            (Err(e), Some(_)) => panic!("byte {at}: {e}"),
+        }
+    }
+}
+
+#[test]
+fn chunks_that_change_places_or_come_twice_are_found() {
+    let bytes = victim();
+    let directory = RangeReader::new(&bytes[..]).unwrap().directory().clone();
+    let n = directory.chunks.len();
+    let build = |picks: &[usize]| {
+        let mut out = bytes[..48].to_vec();
+        out[24..28].copy_from_slice(&(picks.len() as u32).to_le_bytes());
+        let mut at = 48 + 64 * picks.len() as u64;
+        for &k in picks {
+            let mut entry = bytes[48 + 64 * k..48 + 64 * (k + 1)].to_vec();
+            entry[40..48].copy_from_slice(&at.to_le_bytes());
+            out.extend(entry);
+            at += directory.chunks[k].stored;
+        }
+        for &k in picks {
+            let r = directory.chunks[k].range();
+            out.extend_from_slice(&bytes[r.start as usize..r.end as usize]);
+        }
+        out[32..40].copy_from_slice(&at.to_le_bytes());
+        sign(&mut out);
+        out
+    };
+    let all: Vec<usize> = (0..n).collect();
+    assert_eq!(build(&all), bytes);
+    for k in 0..n {
+        let mut twice = all.clone();
+        twice.insert(k, k);
+        let scene = directory.chunks[k].kind == ChunkType::SCENE;
+        let order = directory.chunks[k].kind == ChunkType::ORDER;
+        assert!(decode(&build(&twice)).is_err(), "{k}: {}", directory.chunks[k].kind);
+        let mut less = all.clone();
+        less.remove(k);
+        if let Ok(d) = decode(&build(&less)) {
+            assert!(scene || order || !d.report.complete);
+            walk(&d);
+        }
+        for j in 0..k {
+            let mut swapped = all.clone();
+            swapped.swap(j, k);
+            match decode(&build(&swapped)) {
+                Ok(d) => walk(&d),
+                Err(e) => assert!(!e.to_string().is_empty()),
+            }
+        }
+    }
+}
+
+#[test]
+fn sizes_that_lie_are_found_and_cost_nothing() {
+    let bytes = victim();
+    let n = u32::from_le_bytes(bytes[24..28].try_into().unwrap()) as usize;
+    let fields = [8, 12, 16, 20, 40, 48, 56];
+    for k in 0..n {
+        for field in fields {
+            for value in [0, 77, u32::MAX, 1 << 20] {
+                let mut bad = bytes.clone();
+                let at = 48 + 64 * k + field;
+                if bad[at..at + 4] == u32::to_le_bytes(value) {
+                    continue;
+                }
+                bad[at..at + 4].copy_from_slice(&value.to_le_bytes());
+                sign(&mut bad);
+                match decode_prefix(&bad) {
+                    Ok(d) => walk(&d),
+                    Err(e) => assert!(!e.to_string().is_empty()),
+                }
+            }
+        }
+    }
+    for (at, value) in [(20, u32::MAX), (24, u32::MAX), (24, 3), (28, 8), (32, 1), (12, 1), (8, 9)] {
+        let mut bad = bytes.clone();
+        bad[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        assert!(decode(&bad).is_err());
+    }
+}
+
+#[test]
+fn contents_that_lie_under_a_right_checksum_are_no_panic() {
+    let bytes = victim();
+    let directory = RangeReader::new(&bytes[..]).unwrap().directory().clone();
+    for c in &directory.chunks {
+        let r = c.range();
+        for at in (r.start..r.end).step_by(5) {
+            for change in [0x01, 0xFF] {
+                let mut bad = bytes.clone();
+                bad[at as usize] ^= change;
+                let sum = crc32fast::hash(&bad[r.start as usize..r.end as usize]);
+                let entry = 48 + 64 * c.index as usize;
+                bad[entry + 36..entry + 40].copy_from_slice(&sum.to_le_bytes());
+                sign(&mut bad);
+                walk(&decode_prefix(&bad).unwrap());
+            }
+        }
+    }
+}
+
+#[test]
+fn quantised_places_lie_on_the_grid_and_the_error_is_what_is_said() {
+    let mesh = sample("scan", 3000, 5);
+    let input = mesh.to_input();
+    let pm = build(mesh, &runs()[0], &Quiet).unwrap().mesh;
+    for bits in [8, 14] {
+        let d = decode(&one(&pm, &EncodeOptions::default().with_quantize(Some(bits)))).unwrap();
+        let out = full(&d.meshes[0]);
+        assert_eq!(out.corners, input.corners);
+        let moved = input.positions.iter().zip(out.positions.iter()).map(|(a, b)| a.distance(b));
+        let worst = moved.fold(0.0, f64::max);
+        let (low, high) = input.positions.bounds().unwrap();
+        let cell = (high - low).max_element() / f64::from(1 << bits);
+        assert!(worst > 0.0 && worst <= d.report.quantisation_errors[0]);
+        assert!(d.report.quantisation_errors[0] <= cell);
+    }
+    assert_eq!(
+        encode(&[pm], &[], &[], &EncodeOptions::default().with_quantize(Some(1))),
+        Err(EncodeError::Bits(1))
+    );
+}
+
+#[test]
+fn without_the_order_the_mesh_is_the_same_but_for_numbers() {
+    for name in NAMES {
+        let mesh = sample(name, 1500, 2);
+        let pm = build(mesh, &runs()[1], &Quiet).unwrap().mesh;
+        let with = one(&pm, &EncodeOptions::default());
+        let without = one(&pm, &EncodeOptions::default().with_any_order(true));
+        assert!(without.len() < with.len());
+        let d = decode(&without).unwrap();
+        assert!(d.meshes[0].order.is_none() && d.report.complete);
+        let corners = |pm: &ProgressiveMesh| {
+            let mut c = pm.cursor().unwrap();
+            c.seek(usize::MAX).unwrap();
+            let at = |&w: &u32| {
+                let row: Vec<u32> = c.row(w).iter().map(|x| x.to_bits()).collect();
+                (c.positions().bits(c.wedge_vertex(w) as usize), row)
+            };
+            // Corners of a face turned so that the least comes first.
+            let turned = |f: &[u32; 3]| {
+                let f: Vec<_> = f.iter().map(at).collect();
+                (0..3).map(|k| [f[k].clone(), f[(k + 1) % 3].clone(), f[(k + 2) % 3].clone()]).min()
+            };
+            let mut all: Vec<_> = c.indices().iter().map(turned).collect();
+            all.sort();
+            all
+        };
+        assert!(corners(&d.meshes[0]) == corners(&pm), "{name}");
+    }
+}
+
+#[test]
+fn levels_of_passes_stand_where_chunks_end() {
+    let mesh = sample("scan", 6000, 3);
+    let pm = build(mesh, &runs()[3], &Quiet).unwrap().mesh;
+    assert!(pm.levels.len() > 3);
+    let bytes = one(&pm, &EncodeOptions::default());
+    let d = decode(&bytes).unwrap();
+    assert_eq!(d.meshes[0].levels, pm.levels);
+    let directory = RangeReader::new(&bytes[..]).unwrap().directory().clone();
+    let ends: Vec<u32> = directory.chunks.iter().map(|c| c.first + c.count).collect();
+    assert!(pm.levels[1..].iter().all(|l| ends.contains(l)));
+}
+
+/// Seeds of the fuzz target `decode_pm`, and what it found.
+#[test]
+fn every_file_of_the_corpus_and_every_truncation_is_survived() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
+    let (mut files, mut whole) = (0, 0);
+    for file in std::fs::read_dir(folder).unwrap() {
+        let bytes = std::fs::read(file.unwrap().path()).unwrap();
+        files += 1;
+        whole += decode(&bytes).is_ok() as usize;
+        for end in 0..=bytes.len() {
+            if let Ok(d) = decode_prefix(&bytes[..end]) {
+                walk(&d);
+            }
+        }
+    }
+    assert!(files >= 3 && whole >= 3, "{files} files, {whole} whole");
+}

@@ -31,8 +31,12 @@ pub struct MeshHead {
     pub lattices: Vec<Lattice>,
     /// Split counts at which levels stand.
     pub levels: Vec<u32>,
+    /// The splits that make one face, as at a border; all others make two. With this list every face tells the split that made it.
+    pub single: Vec<u32>,
     /// What quantising moved a vertex by at most, model units; 0 without.
     pub quantisation_error: f64,
+    /// Faces at full detail of which quantising put two corners at one place.
+    pub flat_faces: u32,
 }
 
 const DOUBLE: u8 = 1;
@@ -41,6 +45,30 @@ const MATERIALS: u8 = 4;
 const GROUPS: u8 = 8;
 
 impl MeshHead {
+    /// The first face that split `i` makes. O(log n).
+    pub fn first_face(&self, i: u32) -> u32 {
+        let single = self.single.partition_point(|&s| s < i) as u32;
+        self.base_faces + 2 * i - single
+    }
+
+    /// Split `i` makes one face only. O(log n).
+    pub fn is_single(&self, i: u32) -> bool {
+        self.single.binary_search(&i).is_ok()
+    }
+
+    /// The split that makes face `f`, and whether `f` is its second; `None` for a face of the base. O(log n).
+    pub fn maker(&self, f: u32) -> Option<(u32, bool)> {
+        let k = f.checked_sub(self.base_faces)?;
+        // Singles whose face comes before.
+        let (mut low, mut high) = (0, self.single.len());
+        while low < high {
+            let mid = (low + high) / 2;
+            if 2 * self.single[mid] - (mid as u32) < k { low = mid + 1 } else { high = mid }
+        }
+        let k = k + low as u32;
+        Some((k / 2, k % 2 == 1))
+    }
+
     /// Numbers in a row of attributes.
     pub(super) fn stride(&self) -> usize {
         self.channels.iter().flatten().map(|c| c.width).sum()
@@ -58,6 +86,7 @@ impl MeshHead {
             put_varint(out, n as u64);
         }
         out.extend_from_slice(&self.quantisation_error.to_le_bytes());
+        put_varint(out, self.flat_faces as u64);
         out.push(self.lattices.len() as u8);
         for l in &self.lattices {
             for x in l.origin.iter().chain([&l.step, &l.parts]) {
@@ -66,6 +95,12 @@ impl MeshHead {
         }
         put_varint(out, self.levels.len() as u64);
         self.levels.iter().for_each(|&l| put_varint(out, l as u64));
+        put_varint(out, self.single.len() as u64);
+        let mut next = 0;
+        for &i in &self.single {
+            put_varint(out, (i - next) as u64);
+            next = i + 1;
+        }
         if let Some(channels) = &self.channels {
             out.push(channels.len() as u8);
             for c in channels {
@@ -86,6 +121,7 @@ impl MeshHead {
             *n = u32::try_from(take_varint(from)?).ok()?;
         }
         h.quantisation_error = take_f64(from)?;
+        h.flat_faces = u32::try_from(take_varint(from)?).ok()?;
         let lattices = take_byte(from)? as usize;
         if lattices > MAX_LATTICES {
             return None;
@@ -108,6 +144,21 @@ impl MeshHead {
                 return None;
             }
             h.levels.push(level);
+        }
+        let single = take_varint(from)?;
+        if single > from.len() as u64 {
+            return None;
+        }
+        let mut next = 0u64;
+        for _ in 0..single {
+            let i = next.checked_add(take_varint(from)?).filter(|&i| i < h.splits as u64)?;
+            h.single.push(i as u32);
+            next = i + 1;
+        }
+        // Faces must fit their fields.
+        let faces = h.base_faces as u64 + 2 * h.splits as u64 - single;
+        if faces >= 1 << 29 || h.base_vertices as u64 + h.splits as u64 >= NONE as u64 {
+            return None;
         }
         if flags & ATTRIBUTES != 0 {
             let count = take_byte(from)? as usize;
@@ -285,7 +336,10 @@ fn code_base<C: Coder>(c: &mut C, head: &MeshHead, pm: &mut ProgressiveMesh) -> 
         let mut last = 0;
         for i in 0..head.base_wedges as usize {
             let v = if C::READS { 0 } else { w.base_vertex[i] };
-            last = fits(c.signed(&mut m.wedge, v as i64 - last as i64) + last as i64, head.base_vertices)?;
+            last = fits(
+                c.signed(&mut m.wedge, v as i64 - last as i64).wrapping_add(last as i64),
+                head.base_vertices,
+            )?;
             let source = (!C::READS).then(|| (w.present[i], &w.rows[i * w.stride..(i + 1) * w.stride]));
             let present = rows.code(c, NONE, source);
             if C::READS {

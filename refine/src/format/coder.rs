@@ -4,8 +4,7 @@
 //! it is given, and reads with a [`Decoder`], which ignores what it is given. So the two cannot drift apart.
 //!
 //! Own code, where zstd is at hand: chunks are decodable alone, so each is small (some 10 KB a stream), and most of its symbols are worth a
-//! fraction of a bit in their context (whether a vertex waits, which way a face runs). Measured on the dragon, the connectivity of a chunk
-//! as byte streams under zstd takes about half again as much.
+//! fraction of a bit in their context (whether a vertex waits, which way a face runs), which a coder of bytes cannot know.
 
 /// Bits of precision of a probability.
 const PRECISION: u32 = 15;

@@ -103,7 +103,7 @@ impl Assembly {
                 part.wedges += wedges;
                 self.turns.extend(std::iter::repeat_n(chunk.mesh, block.splits.len()));
             }
-            (Piece::Order(bytes), Some(Some(part))) => {
+            (Piece::Order(bytes), Some(Some(part))) if part.mesh.order.is_none() => {
                 if part.mesh.splits.len() < part.head.splits as usize {
                     return Err(chunk.damage("it comes before the last split of its mesh"));
                 }
@@ -113,7 +113,7 @@ impl Assembly {
                 part.mesh.order = Some(order);
                 input_order::turn(&mut part.mesh, &tips, false);
             }
-            (Piece::Scene(bytes), _) => self.scene = Some(bytes),
+            (Piece::Scene(bytes), _) if self.scene.is_none() => self.scene = Some(bytes),
             (Piece::Other(_), _) => {}
             _ => return Err(chunk.damage("it does not follow what came before")),
         }
@@ -130,6 +130,7 @@ impl Assembly {
             let n = pm.splits.len() as u32;
             pm.levels = part.head.levels.iter().copied().filter(|&l| l < n).chain([n]).collect();
             report.quantisation_errors.push(part.head.quantisation_error);
+            report.flat_faces.push(part.head.flat_faces);
             report.complete &= n == part.head.splits;
             meshes.push(pm);
         }
@@ -162,6 +163,8 @@ pub struct Report {
     pub damage: Option<FormatError>,
     /// By mesh: how far quantising moved a vertex at most, model units; 0 for none.
     pub quantisation_errors: Vec<f64>,
+    /// By mesh: faces at full detail of which quantising put two corners at one place.
+    pub flat_faces: Vec<u32>,
     /// Bytes in the file.
     pub streams: StreamSizes,
 }

@@ -6,7 +6,7 @@ use super::connect::{Connect, Step};
 use super::places::{self, Places};
 use super::rows::Rows;
 use crate::aif::{NONE, Positions};
-use crate::progressive::{ProgressiveMesh, SplitCode, SplitKind, Splits};
+use crate::progressive::{Damage, ProgressiveMesh, SplitCode, SplitKind, Splits};
 
 /// Consecutive splits of a mesh, with all that belongs to them: parts of the arrays of a [`ProgressiveMesh`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -109,25 +109,30 @@ pub(super) struct Counts {
     pub(super) explicit: usize,
 }
 
-/// Errors in the file: the upper 11 bits of an f32 below the sign, rounded up: 3 bits of mantissa.
-const ERROR_SHIFT: u32 = 20;
+/// Errors in the file: the upper 10 bits of an f32 below the sign, rounded up: 2 bits of mantissa.
+const ERROR_SHIFT: u32 = 21;
 
-/// `error` as the file keeps it: never less, at most an eighth more.
+/// `error` as the file keeps it: never less, at most a quarter more.
 pub(super) fn rounded_error(error: f32) -> f32 {
     f32::from_bits(error_level(error) << ERROR_SHIFT)
 }
 
-fn error_level(error: f32) -> u32 {
+/// Levels that have a symbol of their own; one more stands for all others.
+const LEVELS: u32 = 31;
+
+pub(super) fn error_level(error: f32) -> u32 {
     if error > 0.0 { error.min(f32::MAX).to_bits().div_ceil(1 << ERROR_SHIFT) } else { 0 }
 }
 
 /// One description of the chunk for both directions: `source` when writing, `out` when reading.
 struct Codec<'a> {
     head: &'a MeshHead,
-    connect: Connect,
+    connect: Connect<'a>,
     places: Places<'a>,
     rows: Option<Rows>,
     error: Number,
+    error_near: [Bit; 32],
+    error_start: Option<u32>,
     error_before: u32,
     explicit: [Number; 6],
     none: [Bit; 3],
@@ -138,7 +143,32 @@ struct Codec<'a> {
 
 struct Source<'a> {
     pm: &'a ProgressiveMesh,
+    fans: &'a Fans,
     at: Counts,
+}
+
+/// The edges around the vertex of every split, from the left cut on.
+pub(super) struct Fans {
+    ends: Vec<u32>,
+    edges: Vec<u32>,
+}
+
+impl Fans {
+    pub(super) fn new(pm: &ProgressiveMesh) -> Result<Self, Damage> {
+        let mut fans = Fans { ends: Vec::with_capacity(pm.splits.len()), edges: Vec::new() };
+        let mut c = pm.cursor()?;
+        for _ in 0..pm.splits.len() {
+            c.fan(&mut fans.edges)?;
+            fans.ends.push(fans.edges.len() as u32);
+            c.refine()?;
+        }
+        Ok(fans)
+    }
+
+    fn of(&self, split: usize) -> &[u32] {
+        let start = if split == 0 { 0 } else { self.ends[split - 1] };
+        &self.edges[start as usize..self.ends[split] as usize]
+    }
 }
 
 impl<'a> Codec<'a> {
@@ -149,6 +179,8 @@ impl<'a> Codec<'a> {
             places: Places::new(head.double, &head.lattices),
             rows: head.channels.as_deref().map(Rows::new),
             error: Number::default(),
+            error_near: Default::default(),
+            error_start: None,
             error_before: 0,
             explicit: Default::default(),
             none: Default::default(),
@@ -174,12 +206,11 @@ impl<'a> Codec<'a> {
                 code: splits.code[i],
             }
         });
-        let step = self.connect.code(&mut c[CONNECTIVITY], step)?;
+        let fan = source.as_ref().map_or(&[][..], |s| s.fans.of(s.at.split));
+        let step = self.connect.code(&mut c[CONNECTIVITY], step, fan)?;
         // Error.
-        let level = source.as_ref().map_or(0, |s| error_level(s.pm.splits.error[s.at.split])) as i64;
-        let before = self.error_before as i64;
-        let level = c[ERRORS].signed(&mut self.error, level - before).wrapping_add(before);
-        self.error_before = u32::try_from(level).ok().filter(|&l| l <= 0x7F8)?;
+        let level = source.as_ref().map_or(0, |s| error_level(s.pm.splits.error[s.at.split]));
+        self.error_before = self.level(&mut c[ERRORS], level).filter(|&l| l <= 0x3FC)?;
         // Places.
         let expected = self.connect.expected();
         let at = source.as_ref().map_or([0.0; 3], |s| places::point(&s.pm.new_positions, s.at.split));
@@ -215,7 +246,7 @@ impl<'a> Codec<'a> {
             }
         }
         if self.rows.is_some() {
-            out.wedges += new as u32;
+            out.wedges = out.wedges.checked_add(u32::try_from(new).ok()?)?;
         }
         if let Some(s) = source {
             s.at.split += 1;
@@ -227,6 +258,17 @@ impl<'a> Codec<'a> {
             }
         }
         Some(())
+    }
+
+    /// A level of error: one of some around the first of the chunk, or any.
+    fn level<C: Coder>(&mut self, c: &mut C, level: u32) -> Option<u32> {
+        let start = *self.error_start.get_or_insert_with(|| c.plain(16, level).saturating_sub(LEVELS - 4));
+        let inside = (level.wrapping_sub(start)).min(LEVELS);
+        let inside = c.symbol(&mut self.error_near, 5, inside);
+        if inside < LEVELS {
+            return Some(start + inside);
+        }
+        u32::try_from(c.number(&mut self.error, level as u64)).ok()
     }
 
     /// A material or group: mostly that of the face before.
@@ -273,7 +315,7 @@ impl<'a> Codec<'a> {
                 }
                 new = 0;
                 let tips = 3 + 3 * step.code.two_faces() as u64;
-                for k in 0..(2 * pairs).checked_add(listed)?.checked_add(tips)? {
+                for k in 0..pairs.checked_mul(2)?.checked_add(listed)?.checked_add(tips)? {
                     let (m, flag) = match k {
                         _ if k >= 2 * pairs + listed => (4 + ((k - 2 * pairs - listed) % 3 == 2) as usize, 2),
                         _ if k >= 2 * pairs => (3, 1),
@@ -283,7 +325,8 @@ impl<'a> Codec<'a> {
                     let id = if c.bit(&mut self.none[flag], value == NONE) {
                         NONE
                     } else {
-                        let x = wedge as i64 - c.signed(&mut self.explicit[m], wedge as i64 - value as i64);
+                        let back = c.signed(&mut self.explicit[m], wedge as i64 - value as i64);
+                        let x = (wedge as i64).wrapping_sub(back);
                         u32::try_from(x).ok()?
                     };
                     new += (k < 2 * pairs && k % 2 == 1 && id != NONE && id as usize >= wedge) as usize;
@@ -330,13 +373,15 @@ pub(super) type Sizes = [u64; STREAMS];
 pub(super) fn write(
     head: &MeshHead,
     pm: &ProgressiveMesh,
+    fans: &Fans,
     first: Counts,
     count: usize,
 ) -> Option<(Vec<u8>, Sizes)> {
     let mut streams: [Encoder; STREAMS] = Default::default();
     let mut codec = Codec::new(head, first);
-    codec.connect.begin(&mut streams[CONNECTIVITY], &pm.splits.vertex[first.split..first.split + count])?;
-    let mut source = Some(Source { pm, at: first });
+    let vertices = &pm.splits.vertex[first.split..first.split + count];
+    codec.connect.begin(&mut streams[CONNECTIVITY], vertices)?;
+    let mut source = Some(Source { pm, fans, at: first });
     let mut nothing = SplitBlock::default();
     for _ in 0..count {
         codec.split(&mut streams, &mut source, &mut nothing)?;
@@ -362,6 +407,10 @@ pub(super) fn read(
     raw: u64,
     mut bytes: &[u8],
 ) -> Option<SplitBlock> {
+    let end = (first as u64).checked_add(count as u64)?;
+    if end > head.splits as u64 || first_face != head.first_face(first) {
+        return None;
+    }
     let first_wedge = u32::try_from(take_varint(&mut bytes)?).ok()?;
     let mut next = || {
         let length = usize::try_from(take_varint(&mut bytes)?).ok()?;

@@ -3,9 +3,9 @@
 use super::base::{self, MeshHead};
 use super::container::{Chunk, ChunkType, Directory, EXPANSION};
 use super::input_order;
-use super::places::Lattice;
+use super::lattice;
 use super::plan::{Piece, Plan};
-use super::splits::{self, Counts};
+use super::splits::{self, Counts, Fans};
 use crate::progressive::{Damage, ProgressiveMesh, RowsOf};
 
 /// How to write.
@@ -94,6 +94,9 @@ pub fn encode(
     scene: &[u8],
     options: &EncodeOptions,
 ) -> Result<Vec<u8>, EncodeError> {
+    if let Some(bits) = options.quantize.filter(|b| !(2..=30).contains(b)) {
+        return Err(EncodeError::Bits(bits));
+    }
     let mut bases = Vec::with_capacity(meshes.len());
     let mut chunks: Vec<Vec<Part>> = Vec::with_capacity(meshes.len());
     let mut orders = Vec::new();
@@ -146,11 +149,19 @@ fn encode_mesh(
     turns: &[u32],
     options: &EncodeOptions,
 ) -> Option<MeshParts> {
-    let plan = Plan::new(source);
+    let plan = Plan::new(source)?;
     let mut pm = source.reordered(&plan.order).ok()?;
     let tips = input_order::tips(&pm);
     input_order::turn(&mut pm, &tips, true);
-    let lattices: Vec<Lattice> = Vec::new();
+    let (mut lattices, mut quantisation_error, mut flat_faces) = (Vec::new(), 0.0, 0);
+    match options.quantize {
+        Some(bits) if pm.base_vertices() > 0 => {
+            let (grid, error) = lattice::quantise(&mut pm, bits)?;
+            lattices.push(grid);
+            (quantisation_error, flat_faces) = (error, lattice::flat_faces(&pm)?);
+        }
+        _ => lattices.extend(lattice::find(&pm)),
+    }
     let head = MeshHead {
         splits: pm.splits.len() as u32,
         base_vertices: pm.base_vertices() as u32,
@@ -163,14 +174,17 @@ fn encode_mesh(
         groups: !pm.face_group.is_empty(),
         lattices,
         levels: plan.levels.clone(),
-        quantisation_error: 0.0,
+        single: pm.splits.code.iter().zip(0..).filter(|(c, _)| !c.two_faces()).map(|(_, i)| i).collect(),
+        quantisation_error,
+        flat_faces,
     };
     let mut base = part(ChunkType::BASE, true, m, base::raw_bytes(&head), base::write(&head, &mut pm)?);
     base.chunk.count = head.base_vertices;
+    let fans = Fans::new(&pm).ok()?;
     let starts = starts(&pm, &pm.rows_of_splits(), &plan.pieces);
     let one = |(piece, ends): (&Piece, &[Counts])| {
         let (first, end) = (ends[0], ends[1]);
-        let (bytes, _) = splits::write(&head, &pm, first, piece.count)?;
+        let (bytes, _) = splits::write(&head, &pm, &fans, first, piece.count)?;
         let mut p = part(ChunkType::SPLITS, true, m, raw_bytes(&head, first, end), bytes);
         let range = first.split..end.split;
         p.chunk.first = first.split as u32;

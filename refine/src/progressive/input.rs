@@ -180,10 +180,13 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
         let patches: FxHashMap<u32, usize> = order.rows.iter().enumerate().map(|(k, r)| (r.0, k)).collect();
         let mut out = Wedges::new(have.channels().to_vec()).ok()?;
         let stride = out.stride();
+        let nothing = vec![0.0; stride];
         for (w, &s) in source.iter().enumerate() {
             match patches.get(&(w as u32)) {
                 Some(&k) => out.push(&order.values[k * stride..(k + 1) * stride], order.rows[k].1),
-                None => out.push(have.row(s), have.present(s)),
+                None if s != NONE => out.push(have.row(s), have.present(s)),
+                // A number that no corner has: only in a damaged order.
+                None => out.push(&nothing, 0),
             };
         }
         out.corner = corner;
