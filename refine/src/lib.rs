@@ -9,7 +9,7 @@
 //! one collapse takes time in proportion to the valence, and memory is one flat record of about 100 bytes a collapse.
 //!
 //! There now: the multiresolution scheme in memory, [progressive meshes](progressive), their [files and
-//! streams](format), and [geomorphs](geomorph). Not there yet: view-dependent refinement; it will build on the same records.
+//! streams](mod@format), and [geomorphs](geomorph). Not there yet: view-dependent refinement; it will build on the same records.
 //!
 //! ```
 //! use progmesh_refine::{History, simplify::{Options, Quiet}};
