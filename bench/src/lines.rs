@@ -39,6 +39,9 @@ pub(crate) struct ToolLine {
     pub(crate) missing: Option<String>,
 }
 
+/// Errors below this part of the diagonal are those of single precision: as good as none, and none better than another.
+pub(crate) const ROUNDING: f64 = 1e-8;
+
 /// What several runs took: the median, and all of them in order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Runs {
@@ -90,9 +93,9 @@ impl Row {
             && self.threads == other.threads
     }
 
-    /// Root mean square distance, worse direction, over the diagonal; `None` without a result.
+    /// Root mean square distance, worse direction, over the diagonal, but at least [`ROUNDING`]; `None` without a result.
     pub(crate) fn rms(&self) -> Option<f64> {
-        self.measures.as_ref().map(|m| m.worse.rms / m.diagonal)
+        self.measures.as_ref().map(|m| (m.worse.rms / m.diagonal).max(ROUNDING))
     }
 
     /// Seconds and error, if there is a result.

@@ -2,6 +2,7 @@
 
 mod check;
 mod child;
+mod heats;
 mod instructions;
 mod kernels;
 mod lines;
@@ -201,7 +202,7 @@ fn report(places: &Places, out: &Out, publish: bool) -> Result<()> {
     let all = results::Results::of(lines::read(&out.results())?);
     ensure!(!all.rows.is_empty(), "{}: nothing was measured", out.results().display());
     put(&out.folder.join("table.md"), &table::markdown(&all))?;
-    put(&out.folder.join("report.html"), &page::html(&all, &[]))?;
+    put(&out.folder.join("report.html"), &page::html(&all, &heats::heats(&all, out)?))?;
     if publish {
         let root = places.bench.join("..");
         let readme = root.join("README.md");

@@ -1,6 +1,6 @@
 //! The results in Markdown.
 
-use crate::lines::{MeshLine, Row};
+use crate::lines::{MeshLine, ROUNDING, Row};
 use crate::measures::Measures;
 use crate::results::{Duel, Results, label, name};
 use crate::stats::{Standing, front};
@@ -77,7 +77,7 @@ fn group(all: &Results, mesh: &str, ratio: f64) -> String {
             return vec![label, format!("failed: {why}")];
         }
         let Some(m) = &row.measures else { return vec![label, "not measured".into()] };
-        let of = |d: f64| figures(1e5 * d / m.diagonal);
+        let of = |d: f64| error(d / m.diagonal);
         let miss = if row.on_target() { "" } else { " (off target)" };
         vec![
             if best { format!("**{label}**") } else { label },
@@ -95,7 +95,7 @@ fn group(all: &Results, mesh: &str, ratio: f64) -> String {
             format!("{:.0} %", 100.0 * crate::stats::spread(&row.call.all)),
             seconds(row.arrays.median),
             seconds(row.process.median),
-            row.cpu_seconds.map_or("-".into(), |c| format!("{:.1}", c / row.process.median)),
+            cores(row),
             row.peak_bytes.map_or("-".into(), |b| format!("{}", b >> 20)),
         ]
     });
@@ -121,6 +121,14 @@ fn group(all: &Results, mesh: &str, ratio: f64) -> String {
     let mut out = table(&head, cells);
     out += "\nBold: no other is at least as good in seconds and rms and better in one.\n";
     out
+}
+
+/// Processor seconds over seconds of the process; the system's clock is too coarse for short ones.
+fn cores(row: &Row) -> String {
+    match row.cpu_seconds {
+        Some(c) if row.process.median > 0.2 => format!("{:.1}", c / row.process.median),
+        _ => "-".into(),
+    }
 }
 
 /// Components, border loops, handles, non-manifold edges.
@@ -175,7 +183,7 @@ pub(crate) fn losses(all: &Results) -> String {
 
 fn duel(d: &Duel<'_>) -> Vec<String> {
     let both = |r: &Row| match r.point() {
-        Some([s, e]) => format!("{}, {}", figures(1e5 * e), seconds(s)),
+        Some([s, e]) => format!("{}, {}", error(e), seconds(s)),
         None => "-".into(),
     };
     let answer = d.answer.map_or("none".into(), |a| format!("{} ({})", name(&a.tool), both(a)));
@@ -211,7 +219,7 @@ pub(crate) fn summary(all: &Results) -> String {
             Some(row) => match row.point() {
                 Some([s, e]) => {
                     let mark = if row.on_target() { "" } else { "*" };
-                    format!("{}{mark} / {}", figures(1e5 * e), seconds(s))
+                    format!("{}{mark} / {}", error(e), seconds(s))
                 }
                 None => "refused".into(),
             },
@@ -307,6 +315,11 @@ pub(crate) fn figures(x: f64) -> String {
     format!("{x:.digits$}")
 }
 
+/// A length in diagonals as 1e-5 of them; below the rounding of single precision no digits mean anything.
+fn error(d: f64) -> String {
+    if d <= ROUNDING { format!("<{}", 1e5 * ROUNDING) } else { figures(1e5 * d) }
+}
+
 /// Seconds: three figures, but no finer than a tenth of a millisecond.
 pub(crate) fn seconds(s: f64) -> String {
     if s < 0.01 { format!("{s:.4}") } else { figures(s) }
@@ -344,6 +357,7 @@ mod tests {
         );
         assert_eq!(figures(1.234e-9), "1.23e-9");
         assert_eq!([0.00123, 0.0213, 1.0].map(seconds), ["0.0012", "0.0213", "1.00"]);
+        assert_eq!([0.0, 9e-9, 1e-5].map(error), ["<0.001", "<0.001", "1.00"]);
         assert_eq!([0.1, 0.025, 1.0].map(per_cent), ["10 %", "2.5 %", "100 %"]);
         assert_eq!([7, 1000, 1234567].map(thousands), ["7", "1,000", "1,234,567"]);
     }
