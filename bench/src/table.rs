@@ -397,6 +397,10 @@ mod tests {
     fn the_summary_goes_between_the_marks_again_and_again() {
         let part = summary(&results());
         assert!(part.contains("| progmesh quadric, 2 threads | 40.0 / 0.200 |"), "{part}");
+        assert!(!part.contains("Other programs"));
+        let mut busy = results();
+        busy.machine.load = Some(3.0);
+        assert!(summary(&busy).contains("load 3.0"));
         assert!(part.contains("Better in both: meshoptimizer on bunny to 10 %."), "{part}");
         let text = format!("a\n{BEGIN}old\n{END}b\n");
         let once = spliced(&text, &part).unwrap();
