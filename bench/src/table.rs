@@ -228,7 +228,12 @@ pub(crate) fn summary(all: &Results) -> String {
         cells
     });
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    let mut out = table(&head, rows);
+    let mut out = String::from(
+        "![Seconds of the call against rms distance, a line a tool, a point a ratio](docs/bench.svg)\n\n\
+         rms: distance between result and original, worse direction, in 1e-5 of the diagonal. Seconds: the call alone, arrays in memory to \
+         arrays in memory; median of 5 processes, all tools taking turns.\n\n",
+    );
+    out += &table(&head, rows);
     out += "\n\\* not within 1 % of the triangles asked for.\n\n";
     let machine: Vec<String> =
         all.machine.words().into_iter().take(2).map(|(k, v)| format!("{k} {v}")).collect();
