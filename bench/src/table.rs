@@ -240,6 +240,12 @@ pub(crate) fn summary(all: &Results) -> String {
     let version = |t: &crate::lines::ToolLine| Some(format!("{} {}", name(&t.tool), t.version.as_ref()?));
     let versions: Vec<String> = all.tools.iter().filter(|t| peer(&t.tool)).filter_map(version).collect();
     let _ = writeln!(out, "{}. {}.", machine.join(", "), versions.join(", "));
+    if let Some(load) = all.machine.load.filter(|l| *l > 0.5) {
+        let _ = writeln!(
+            out,
+            "\nOther programs were using the machine (load {load:.1} before the run): seconds are too high, for all tools alike."
+        );
+    }
     for t in all.tools.iter().filter(|t| t.missing.is_some()) {
         let _ = writeln!(
             out,
@@ -257,14 +263,14 @@ fn peer(id: &str) -> bool {
 
 /// In a paragraph: how often peers are better.
 fn verdict(all: &Results) -> String {
-    let mut out = String::from("Where we lose:");
+    let mut out = String::from("Where we lose.");
     for threads in all.default_threads() {
         let duels = all.duels(threads);
         let n = |s| duels.iter().filter(|d| d.standing == s).count();
         let plural = if threads == 1 { "" } else { "s" };
         let _ = write!(
             out,
-            " with {threads} thread{plural}, of {} comparisons of the default method with a peer, the peer is better in seconds and rms in \
+            " With {threads} thread{plural}, of {} comparisons of the default method with a peer, the peer is better in seconds and rms in \
              {}, faster only in {}, more exact only in {}.",
             duels.len(),
             n(Standing::LosesBoth),
