@@ -11,8 +11,10 @@ pub use progmesh_simplify as simplify;
 
 pub mod compare;
 pub mod io;
+pub mod levels;
 pub mod normals;
 pub mod pipeline;
+pub mod progressive;
 pub mod report;
 pub mod samples;
 pub mod scene;

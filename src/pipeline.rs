@@ -14,8 +14,10 @@ use std::time::Instant;
 mod certified;
 mod least;
 mod locks;
+mod progressive;
 mod scale;
 
+pub use progressive::{Refinable, build_progressive};
 pub use scale::{world_bounds, world_scales};
 
 /// What to do with a scene. Start from `Job::default()` and set what differs.
@@ -173,6 +175,9 @@ pub enum JobError {
     /// Computed normals would be one attribute too many.
     #[error("{0}")]
     Channels(#[from] crate::aif::TooManyChannels),
+    /// What was asked for is no sequence of edge collapses.
+    #[error(transparent)]
+    Progressive(#[from] crate::refine::progressive::EncodeError),
     /// The result breaks an invariant of the mesh: a fault of this program, not of the input.
     #[error("{mesh}the result is no valid mesh: {source}; please report this")]
     Broken {

@@ -419,6 +419,66 @@ fn info_prints_one_object_with_the_documented_fields() {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct Levels {
+    command: String,
+    file: String,
+    faces: usize,
+    diagonal: f64,
+    threads: usize,
+    runs: usize,
+    methods: Vec<LevelsOfMethod>,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LevelsOfMethod {
+    method: String,
+    levels: Vec<DetailLevel>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DetailLevel {
+    level: usize,
+    faces: usize,
+    splits: usize,
+    seconds: LevelSeconds,
+    #[serde(deserialize_with = "present")]
+    measured: Option<Distance>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Distance {
+    max: f64,
+    rms: f64,
+    mean: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LevelSeconds {
+    simplify: f64,
+    coarsen: f64,
+    refine: f64,
+}
+
+#[test]
+fn levels_prints_one_object_with_the_documented_fields() {
+    let p = Place::new();
+    p.generate("torus", "in.obj", 600);
+    let run = p.done("levels in.obj --json --runs 1 --samples 1000 --epsilon 60");
+    let l: Levels = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!((l.command.as_str(), l.faces, l.threads, l.runs), ("levels", 600, 1, 1));
+    assert!(l.methods.iter().all(|m| !m.levels.is_empty() && m.levels[0].level == 1));
+    let run = p.done("levels in.obj --json --runs 1 --samples 0 --method nsa");
+    let l: Levels = serde_json::from_str(&run.stdout).unwrap();
+    assert!(l.methods.iter().flat_map(|m| &m.levels).all(|l| l.measured.is_none()));
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Convert {
     command: String,
     from: String,
@@ -529,6 +589,7 @@ fn every_field_is_documented() {
     let others = [
         "info in.obj --json",
         "compare torus.obj out.obj --certify 1e-2 --threshold 1 --samples 100 --json",
+        "levels in.obj --json --runs 1 --samples 100 --epsilon 60",
         "convert in.obj out.ply --json",
         "generate sphere s.ply --faces 20 --json",
     ];

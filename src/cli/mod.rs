@@ -12,6 +12,7 @@ mod convert;
 mod generate;
 mod heatmap;
 mod info;
+mod levels;
 mod man;
 mod picture;
 mod problems;
@@ -36,6 +37,7 @@ Exit codes: 0 done; 1 done, but the target was missed or a check failed; 2 wrong
 enum Command {
     Simplify(Box<simplify::Args>),
     Info(info::Args),
+    Levels(levels::Args),
     Compare(compare::Args),
     Convert(convert::Args),
     Generate(generate::Args),
@@ -102,6 +104,7 @@ pub(crate) fn main() -> ExitCode {
     let result = match command {
         Command::Simplify(args) => args.run(),
         Command::Info(args) => args.run(),
+        Command::Levels(args) => args.run(),
         Command::Compare(args) => args.run(),
         Command::Convert(args) => args.run(),
         Command::Generate(args) => args.run(),

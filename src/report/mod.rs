@@ -12,6 +12,7 @@ mod font;
 mod heat;
 mod page;
 mod picture;
+pub mod plot;
 mod raster;
 mod render;
 mod surface;

@@ -1,0 +1,73 @@
+//! A whole scene as progressive meshes.
+
+use super::{Changes, Job, JobError, label, scale, world_scales};
+use crate::aif::{BuildOptions, Mesh, Weld};
+use crate::normals::{self, Normals};
+use crate::progressive::{ProgressiveScene, shell_of};
+use crate::refine::progressive::{EncodeError, build_all};
+use crate::scene::Scene;
+use crate::simplify::{Control, Stop};
+use std::time::Instant;
+
+/// What came of [`build_progressive`].
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Refinable {
+    /// The progressive meshes, and the scene around them.
+    pub scene: ProgressiveScene,
+    /// Why the simplification to the bases ended.
+    pub stop: Stop,
+    /// The largest estimated error of a base, world units. Not a bound.
+    pub estimate: f64,
+    /// Seconds from arrays to meshes.
+    pub build_seconds: f64,
+    /// Seconds from meshes to splits.
+    pub simplify_seconds: f64,
+    /// What was changed that was not asked for, each said once.
+    pub warnings: Vec<String>,
+}
+
+/// Makes progressive meshes of all meshes of `scene`, in one simplification with a shared order of splits.
+///
+/// Of the job it heeds the options, welding and normals. Without a target it goes as far as is legal. What building leaves out of a mesh
+/// (faces of no three corners) is not in the result, and said; all else comes back bit for bit at full detail.
+///
+/// Errors: as [`super::simplify_scene`]; methods that are no sequence of edge collapses.
+pub fn build_progressive(scene: Scene, job: &Job, control: &dyn Control) -> Result<Refinable, JobError> {
+    let mut options = job.options.clone();
+    let diagonal = scale::world_diagonal(&scene);
+    if let Some(e) = options.max_error.as_mut().filter(|e| e.relative) {
+        (e.value, e.relative) = (e.value * diagonal, false);
+    }
+    let (scales, mut scene) = (world_scales(&scene), scene);
+    let mut changes = Changes::default();
+    let mut meshes = Vec::with_capacity(scene.meshes.len());
+    let start = Instant::now();
+    for i in 0..scene.meshes.len() {
+        let label = label(&scene, i);
+        let mut input = std::mem::take(&mut scene.meshes[i].geometry);
+        let failed = |source| JobError::Build { mesh: label.clone(), source };
+        if job.normals != Normals::Keep {
+            input.validate().map_err(failed)?;
+            normals::apply(&mut input, job.normals)?;
+        }
+        let (mesh, report) = Mesh::build(input, &BuildOptions::with_weld(job.weld)).map_err(failed)?;
+        changes.add(&label, &report, job.weld != Weld::No);
+        meshes.push(mesh);
+    }
+    let build_seconds = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let built = build_all(meshes, &scales, &options, control).map_err(|e| match e {
+        EncodeError::Simplify(e) => JobError::Options(e),
+        e => JobError::Progressive(e),
+    })?;
+    let estimate = built.estimates.iter().zip(&scales).map(|(e, s)| e * s).fold(0.0, f64::max);
+    Ok(Refinable {
+        scene: ProgressiveScene { meshes: built.meshes, turns: built.turns, shell: shell_of(scene) },
+        stop: built.stop,
+        estimate,
+        build_seconds,
+        simplify_seconds: start.elapsed().as_secs_f64(),
+        warnings: changes.warnings(),
+    })
+}

@@ -1,0 +1,120 @@
+//! A scene whose meshes are progressive: the scene at any level of detail.
+
+use crate::pipeline::world_scales;
+use crate::refine::ProgressiveMesh;
+use crate::refine::progressive::Damage;
+use crate::scene::Scene;
+
+/// A scene with progressive meshes in place of its meshes.
+#[derive(Clone, Debug, Default)]
+pub struct ProgressiveScene {
+    /// One for each mesh of the scene.
+    pub meshes: Vec<ProgressiveMesh>,
+    /// The mesh whose next split comes, coarsest first: the splits of all meshes in one order.
+    pub turns: Vec<u32>,
+    /// Everything else: nodes, materials, images, names. Its meshes have no geometry.
+    pub shell: Scene,
+}
+
+/// How far to refine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Detail {
+    /// The coarsest there is.
+    Base,
+    /// Everything.
+    Full,
+    /// The finest of at most this many triangles over all meshes, or the coarsest there is.
+    Triangles(usize),
+    /// The coarsest from which on no split's estimated error is larger than this, world units. An estimate, no bound.
+    MaxError(f64),
+    /// The level of this number, 0 the coarsest; the finest stands for all beyond. With NSA these are its passes.
+    Level(usize),
+}
+
+impl ProgressiveScene {
+    /// Triangles at full detail. O(n).
+    pub fn triangles(&self) -> usize {
+        self.meshes.iter().map(ProgressiveMesh::faces).sum()
+    }
+
+    /// Triangles of the bases.
+    pub fn base_triangles(&self) -> usize {
+        self.meshes.iter().map(|m| m.base_faces.len()).sum()
+    }
+
+    /// Vertices at full detail.
+    pub fn vertices(&self) -> usize {
+        self.meshes.iter().map(ProgressiveMesh::vertices).sum()
+    }
+
+    /// Splits of all meshes.
+    pub fn splits(&self) -> usize {
+        self.meshes.iter().map(|m| m.splits.len()).sum()
+    }
+
+    /// Levels there are: as many as the mesh with most of them has.
+    pub fn levels(&self) -> usize {
+        self.meshes.iter().map(|m| m.levels.len()).max().unwrap_or(0)
+    }
+
+    /// How many splits of every mesh lead to `detail`. O(n).
+    pub fn positions(&self, detail: Detail) -> Vec<usize> {
+        match detail {
+            Detail::Base => vec![0; self.meshes.len()],
+            Detail::Full => self.meshes.iter().map(|m| m.splits.len()).collect(),
+            Detail::Triangles(most) => self.at_triangles(most),
+            Detail::MaxError(most) => {
+                let each = self.meshes.iter().zip(world_scales(&self.shell));
+                each.map(|(m, scale)| {
+                    let last = m.splits.error.iter().rposition(|&e| e as f64 * scale > most);
+                    last.map_or(0, |i| i + 1)
+                })
+                .collect()
+            }
+            Detail::Level(k) => {
+                // Counted from the finest: a mesh with fewer levels was done earlier.
+                let coarser = self.levels().saturating_sub(1).saturating_sub(k);
+                let of = |m: &ProgressiveMesh| {
+                    let i = m.levels.len().checked_sub(1).map(|last| last.saturating_sub(coarser));
+                    i.map_or(m.splits.len(), |i| m.levels[i] as usize)
+                };
+                self.meshes.iter().map(of).collect()
+            }
+        }
+    }
+
+    fn at_triangles(&self, most: usize) -> Vec<usize> {
+        let mut at = vec![0; self.meshes.len()];
+        let mut have = self.base_triangles();
+        for &m in &self.turns {
+            let Some(mesh) = self.meshes.get(m as usize) else { continue };
+            let Some(code) = mesh.splits.code.get(at[m as usize]) else { continue };
+            have += 1 + code.two_faces() as usize;
+            if have > most {
+                break;
+            }
+            at[m as usize] += 1;
+        }
+        at
+    }
+
+    /// The scene with so many splits of every mesh applied; in the order of the input, if that is known. O(n).
+    ///
+    /// Errors: the number of a mesh, and what is damaged in it.
+    pub fn at(&self, positions: &[usize]) -> Result<Scene, (usize, Damage)> {
+        let mut scene = self.shell.clone();
+        scene.meshes.resize_with(self.meshes.len(), Default::default);
+        for (i, (mesh, &to)) in self.meshes.iter().zip(positions).enumerate() {
+            let mut cursor = mesh.cursor().map_err(|e| (i, e))?;
+            cursor.seek(to).map_err(|e| (i, e))?;
+            scene.meshes[i].geometry = cursor.to_ordered_input();
+        }
+        Ok(scene)
+    }
+}
+
+/// Takes the geometry out of a scene's meshes; what is left is the shell of a [`ProgressiveScene`].
+pub fn shell_of(mut scene: Scene) -> Scene {
+    scene.meshes.iter_mut().for_each(|m| m.geometry = Default::default());
+    scene
+}
