@@ -1,8 +1,12 @@
 //! A scene whose meshes are progressive: the scene at any level of detail.
 
+mod leftover;
+
+pub use leftover::Leftover;
+
 use crate::pipeline::world_scales;
-use crate::refine::ProgressiveMesh;
 use crate::refine::progressive::Damage;
+use crate::refine::{Geomorph, GeomorphError, ProgressiveMesh};
 use crate::scene::Scene;
 
 /// A scene with progressive meshes in place of its meshes.
@@ -14,6 +18,8 @@ pub struct ProgressiveScene {
     pub turns: Vec<u32>,
     /// Everything else: nodes, materials, images, names. Its meshes have no geometry.
     pub shell: Scene,
+    /// For each mesh the faces that no mesh can hold, which are there at full detail only; none where the vector ends.
+    pub leftovers: Vec<Leftover>,
 }
 
 /// How far to refine.
@@ -104,12 +110,44 @@ impl ProgressiveScene {
     pub fn at(&self, positions: &[usize]) -> Result<Scene, (usize, Damage)> {
         let mut scene = self.shell.clone();
         scene.meshes.resize_with(self.meshes.len(), Default::default);
+        // A mesh may be at full detail on the way, but what cannot be simplified is no part of a coarser scene.
+        let whole = self.meshes.iter().zip(positions).all(|(m, &to)| to >= m.splits.len());
         for (i, (mesh, &to)) in self.meshes.iter().zip(positions).enumerate() {
             let mut cursor = mesh.cursor().map_err(|e| (i, e))?;
             cursor.seek(to).map_err(|e| (i, e))?;
-            scene.meshes[i].geometry = cursor.to_ordered_input();
+            let geometry = cursor.to_ordered_input();
+            scene.meshes[i].geometry = match self.leftovers.get(i).filter(|_| whole && mesh.order.is_some()) {
+                Some(left) => left.put_back(geometry),
+                None => geometry,
+            };
         }
         Ok(scene)
+    }
+}
+
+impl ProgressiveScene {
+    /// The scene on the way from the state after so many splits of every mesh to another, at 0 the one, at 1 the other ([`Geomorph`]); and the
+    /// triangles of both. Numbering is that of the splits. O(n).
+    ///
+    /// Errors: the number of a mesh, and what is damaged in it.
+    pub fn between(
+        &self,
+        from: &[usize],
+        to: &[usize],
+        a: f64,
+    ) -> Result<(Scene, [usize; 2]), (usize, GeomorphError)> {
+        let mut scene = self.shell.clone();
+        scene.meshes.resize_with(self.meshes.len(), Default::default);
+        let mut triangles = [0, 0];
+        for (i, ((mesh, &from), &to)) in self.meshes.iter().zip(from).zip(to).enumerate() {
+            let morph = Geomorph::new(mesh, from, to).map_err(|e| (i, e))?;
+            let ends = [morph.coarse_faces(), morph.indices().len()];
+            let rising = from <= to;
+            scene.meshes[i].geometry = morph.at(if rising { a } else { 1.0 - a });
+            triangles[0] += ends[!rising as usize];
+            triangles[1] += ends[rising as usize];
+        }
+        Ok((scene, triangles))
     }
 }
 

@@ -296,8 +296,39 @@ struct Info {
     materials: Vec<String>,
     images: Vec<Image>,
     #[serde(deserialize_with = "present")]
+    progressive: Option<Progressive>,
+    #[serde(deserialize_with = "present")]
     check: Option<String>,
     warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Progressive {
+    base_triangles: usize,
+    splits: usize,
+    levels: usize,
+    #[serde(deserialize_with = "present")]
+    chunks: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    quantization_error: Option<f64>,
+    #[serde(deserialize_with = "present")]
+    streams: Option<Streams>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Streams {
+    head: u64,
+    base: u64,
+    connectivity: u64,
+    errors: u64,
+    positions: u64,
+    attributes: u64,
+    faces: u64,
+    order: u64,
+    scene: u64,
+    other: u64,
 }
 
 #[derive(Deserialize)]
@@ -415,6 +446,115 @@ fn info_prints_one_object_with_the_documented_fields() {
     assert_eq!((i.command.as_str(), i.check.as_deref()), ("info", Some("ok")));
     assert_eq!((i.meshes[0].faces, i.meshes[0].face_sizes.quads), (96, 96));
     assert_eq!(i.images.len(), 1);
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Encode {
+    command: String,
+    method: String,
+    meshes: usize,
+    vertices: usize,
+    triangles: usize,
+    base_triangles: usize,
+    splits: usize,
+    levels: usize,
+    bytes: usize,
+    estimate: f64,
+    #[serde(deserialize_with = "present")]
+    quantization_error: Option<f64>,
+    seconds: EncodeSeconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EncodeSeconds {
+    read: f64,
+    build: f64,
+    simplify: f64,
+    encode: f64,
+    write: f64,
+    total: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Decode {
+    command: String,
+    to: String,
+    meshes: usize,
+    vertices: usize,
+    triangles: usize,
+    full_triangles: usize,
+    base_triangles: usize,
+    splits: usize,
+    full_splits: usize,
+    seconds: DecodeSeconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DecodeSeconds {
+    read: f64,
+    refine: f64,
+    write: f64,
+    total: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Lod {
+    command: String,
+    to: String,
+    levels: Vec<LodLevel>,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LodLevel {
+    triangles: usize,
+    #[serde(deserialize_with = "present")]
+    coverage: Option<f64>,
+    #[serde(deserialize_with = "present")]
+    file: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Morph {
+    command: String,
+    to: String,
+    from_triangles: usize,
+    to_triangles: usize,
+    at: f64,
+    triangles: usize,
+    warnings: Vec<String>,
+}
+
+#[test]
+fn progressive_commands_print_one_object_with_the_documented_fields() {
+    let p = Place::new();
+    p.generate("torus", "in.obj", 600);
+    let of = |arguments: &str| p.done(arguments).stdout;
+    let e: Encode = serde_json::from_str(&of("encode in.obj in.pm --json")).unwrap();
+    assert_eq!((e.command.as_str(), e.method.as_str(), e.triangles), ("encode", "quadric", 600));
+    assert_eq!(e.bytes, p.read("in.pm").len());
+    assert!(e.base_triangles < 600 && e.splits > 200 && e.quantization_error.is_none());
+    let d: Decode = serde_json::from_str(&of("decode in.pm out.ply --triangles 300 --json")).unwrap();
+    assert_eq!((d.command.as_str(), d.to.as_str(), d.full_triangles), ("decode", "ply", 600));
+    assert!(d.triangles <= 300 && d.splits < d.full_splits && d.full_splits == e.splits);
+    let l: Lod = serde_json::from_str(&of("lod in.pm out.glb --levels 0.5 --json")).unwrap();
+    assert_eq!((l.command.as_str(), l.levels.len(), l.levels[1].coverage), ("lod", 2, Some(0.0)));
+    let l: Lod = serde_json::from_str(&of("lod in.pm out.glb --levels 0.5 --separate --json")).unwrap();
+    assert_eq!(l.levels[0].file.as_deref(), Some("out.lod0.glb"));
+    let m: Morph =
+        serde_json::from_str(&of("morph in.pm out.ply --from 100 --to 300 --at 0.5 --json")).unwrap();
+    assert_eq!((m.command.as_str(), m.at, m.triangles), ("morph", 0.5, m.to_triangles));
+    let i: Info = serde_json::from_str(&of("info in.pm --json")).unwrap();
+    assert!(i.progressive.is_some_and(|p| p.streams.is_some() && p.splits == e.splits));
 }
 
 #[derive(Deserialize)]
@@ -589,6 +729,11 @@ fn every_field_is_documented() {
     let others = [
         "info in.obj --json",
         "compare torus.obj out.obj --certify 1e-2 --threshold 1 --samples 100 --json",
+        "encode in.obj in.pm --json",
+        "info in.pm --json",
+        "decode in.pm out.ply --json",
+        "lod in.pm out.glb --levels 0.5 --json",
+        "morph in.pm out.ply --from 50 --to 90 --at 0.5 --json",
         "levels in.obj --json --runs 1 --samples 100 --epsilon 60",
         "convert in.obj out.ply --json",
         "generate sphere s.ply --faces 20 --json",

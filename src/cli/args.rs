@@ -8,6 +8,7 @@ use progmesh::aif::Weld;
 use progmesh::io::files::{self, Loaded};
 use progmesh::io::{EncodeOptions, Format};
 use progmesh::normals::{DEFAULT_CREASE, Normals};
+use progmesh::progressive::ProgressiveScene;
 use progmesh::scene::Scene;
 use std::path::PathBuf;
 
@@ -20,6 +21,7 @@ pub(crate) enum FormatName {
     Ply,
     Stl,
     Off,
+    Pm,
 }
 
 impl From<FormatName> for Format {
@@ -31,6 +33,7 @@ impl From<FormatName> for Format {
             FormatName::Ply => Format::Ply,
             FormatName::Stl => Format::Stl,
             FormatName::Off => Format::Off,
+            FormatName::Pm => Format::Pm,
         }
     }
 }
@@ -54,6 +57,39 @@ impl Input {
 
     pub(crate) fn read(&self, warnings: &mut Warnings) -> Result<Loaded, Failure> {
         common::read(&self.input, self.from, warnings)
+    }
+
+    /// Progressive meshes: those of a progressive mesh file, or of any other what `make` makes of its scene.
+    pub(crate) fn read_or_make(
+        &self,
+        warnings: &mut Warnings,
+        make: impl FnOnce(Scene, &mut Warnings) -> Result<ProgressiveScene, Failure>,
+    ) -> Result<ProgressiveScene, Failure> {
+        let named = || Format::from_name(&self.input.to_string_lossy());
+        if self.from.map(Format::from).or_else(named) == Some(Format::Pm) {
+            return common::read_progressive(&self.input, false, warnings);
+        }
+        make(self.read(warnings)?.decoded.scene, warnings)
+    }
+}
+
+/// `IN.pm`.
+#[derive(clap::Args, Debug)]
+pub(crate) struct ProgressiveInput {
+    /// The progressive mesh to read, ours or Hoppe's; - for standard input
+    #[arg(value_name = "IN.pm")]
+    input: PathBuf,
+}
+
+impl ProgressiveInput {
+    /// Its name, for messages.
+    pub(crate) fn name(&self) -> String {
+        common::name(&self.input, "standard input")
+    }
+
+    /// Reads it; with `salvage`, of a damaged file what comes before the damage.
+    pub(crate) fn read(&self, salvage: bool, warnings: &mut Warnings) -> Result<ProgressiveScene, Failure> {
+        common::read_progressive(&self.input, salvage, warnings)
     }
 }
 
@@ -102,10 +138,17 @@ impl Output {
                 common::or_by_name(&self.output)
             ))
         })?;
+        if format == Format::Pm {
+            return Err(Failure::Usage(format!(
+                "{}: a progressive mesh is written by `progmesh encode`, from the mesh at full detail",
+                self.name()
+            )));
+        }
         let useless = match format {
             _ if !self.text => None,
             Format::Ply | Format::Stl => None,
             Format::Glb => Some("GLB is always binary; gltf is its text form"),
+            Format::Pm => None,
             Format::Obj | Format::Gltf | Format::Off => Some("the format is always text"),
         };
         warnings.say(useless.map(|why| format!("{}: --text changes nothing: {why}", self.name())));

@@ -4,8 +4,10 @@ use super::Failure;
 use super::args::FormatName;
 use super::control::Interrupt;
 use progmesh::io::files::{self, Loaded, ReadError, WriteError};
-use progmesh::io::{EncodeOptions, Format, encode};
+use progmesh::io::{DecodeError, EncodeOptions, Encoded, Format, encode, pm};
 pub(crate) use progmesh::pipeline::thousands;
+use progmesh::progressive::ProgressiveScene;
+use progmesh::refine::format::FormatError;
 pub(crate) use progmesh::report::short;
 use progmesh::scene::Scene;
 use serde::Serialize;
@@ -90,7 +92,7 @@ pub(crate) fn read(
     let file = name(path, "standard input");
     let mut loaded = files::read(path, from.map(Format::from)).map_err(|e| match e {
         ReadError::UnknownFormat => Failure::Usage(format!(
-            "{file}: say its format with --from obj|gltf|glb|ply|stl|off{}",
+            "{file}: say its format with --from obj|gltf|glb|ply|stl|off|pm{}",
             or_by_name(path)
         )),
         ReadError::Mistaken { like, .. } => {
@@ -100,6 +102,40 @@ pub(crate) fn read(
     })?;
     warnings.say(std::mem::take(&mut loaded.decoded.warnings).into_iter().map(|w| format!("{file}: {w}")));
     Ok(loaded)
+}
+
+/// Reads a progressive mesh file; with `salvage`, of a damaged one what comes before the damage.
+pub(crate) fn read_progressive(
+    path: &Path,
+    salvage: bool,
+    warnings: &mut Warnings,
+) -> Result<ProgressiveScene, Failure> {
+    let file = name(path, "standard input");
+    let bytes = files::read_all(path).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+    let read = if salvage { pm::decode_what_is_there(&bytes) } else { pm::decode_progressive(&bytes) };
+    let read = read.map_err(|e| {
+        let advice = match &e {
+            DecodeError::Progressive(FormatError::Chunk { .. }) if !salvage => {
+                "; --salvage of `decode` uses what comes before"
+            }
+            _ => "",
+        };
+        Failure::Input(format!("{file}: {e}{advice}"))
+    })?;
+    warnings.say(read.warnings.into_iter().map(|w| format!("{file}: {w}")));
+    Ok(read.scene)
+}
+
+/// Writes bytes to a path, all or nothing, or to standard output.
+pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    if files::is_dash(path) {
+        let mut out = std::io::stdout().lock();
+        return out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| match e.kind() {
+            std::io::ErrorKind::BrokenPipe => Failure::BrokenPipe,
+            _ => Failure::Output(format!("standard output: {e}")),
+        });
+    }
+    files::write_file(path, bytes).map_err(|e| Failure::Output(format!("{}: {e}", path.display())))
 }
 
 /// Fails where a file of this name could not be written: no directory for it, or a directory in its place.
@@ -118,8 +154,20 @@ pub(crate) fn write(
 ) -> Result<(), Failure> {
     let file = name(path, "standard output");
     let encoded = encode(format, scene, options).map_err(|e| Failure::Output(format!("{file}: {e}")))?;
+    write_encoded(path, format, &encoded, interrupt, warnings)
+}
+
+/// Writes what was encoded.
+pub(crate) fn write_encoded(
+    path: &Path,
+    format: Format,
+    encoded: &Encoded,
+    interrupt: &Interrupt,
+    warnings: &mut Warnings,
+) -> Result<(), Failure> {
+    let file = name(path, "standard output");
     warnings.say(encoded.warnings.iter().map(|w| format!("{file}: {w}")));
-    let said = files::write(path, format, &encoded, &|| interrupt.is_set()).map_err(|e| match e {
+    let said = files::write(path, format, encoded, &|| interrupt.is_set()).map_err(|e| match e {
         WriteError::Cancelled => Failure::Interrupted,
         e if e.is_broken_pipe() => Failure::BrokenPipe,
         // It names the file already.

@@ -6,7 +6,9 @@ use super::picture::PictureArgs;
 use super::{Failure, problems};
 use progmesh::aif::attributes::{Encoding, Semantic};
 use progmesh::aif::{BuildOptions, BuildReport, Mesh, NONE, Weld};
+use progmesh::io::files::About;
 use progmesh::pipeline::{label, world_bounds};
+use progmesh::refine::format::Report;
 use progmesh::scene::Scene;
 use serde::Serialize;
 
@@ -91,6 +93,7 @@ impl Args {
             meshes,
             materials: scene.materials.iter().map(|m| m.name.clone()).collect(),
             images: images(&scene),
+            progressive: loaded.progressive.as_ref().map(ProgressiveInfo::of),
             check: match (self.check, &broken) {
                 (false, _) => None,
                 (true, None) => Some("ok".into()),
@@ -139,8 +142,61 @@ struct Info {
     meshes: Vec<MeshInfo>,
     materials: Vec<String>,
     images: Vec<ImageInfo>,
+    progressive: Option<ProgressiveInfo>,
     check: Option<String>,
     warnings: Vec<String>,
+}
+
+/// What a progressive mesh file holds beside full detail.
+#[derive(Serialize)]
+struct ProgressiveInfo {
+    base_triangles: usize,
+    splits: usize,
+    levels: usize,
+    chunks: Option<u64>,
+    quantization_error: Option<f64>,
+    streams: Option<Streams>,
+}
+
+/// Bytes of the file by what they are for.
+#[derive(Serialize)]
+struct Streams {
+    head: u64,
+    base: u64,
+    connectivity: u64,
+    errors: u64,
+    positions: u64,
+    attributes: u64,
+    faces: u64,
+    order: u64,
+    scene: u64,
+    other: u64,
+}
+
+impl ProgressiveInfo {
+    fn of(about: &About) -> Self {
+        let report = about.report.as_ref();
+        let worst = |r: &Report| r.quantisation_errors.iter().copied().fold(0.0, f64::max);
+        ProgressiveInfo {
+            base_triangles: about.base_triangles,
+            splits: about.splits,
+            levels: about.levels,
+            chunks: report.map(|r| r.streams.chunks),
+            quantization_error: report.map(worst).filter(|&e| e > 0.0),
+            streams: report.map(|r| Streams {
+                head: r.streams.head,
+                base: r.streams.base,
+                connectivity: r.streams.connectivity,
+                errors: r.streams.errors,
+                positions: r.streams.places,
+                attributes: r.streams.attributes,
+                faces: r.streams.faces,
+                order: r.streams.order,
+                scene: r.streams.scene,
+                other: r.streams.other,
+            }),
+        }
+    }
 }
 
 /// Triangles of the unique meshes, as the file has them and after building; those of all instances, as the file has them.

@@ -9,11 +9,16 @@ mod compare;
 mod completions;
 mod control;
 mod convert;
+mod decode;
+mod encode;
 mod generate;
 mod heatmap;
 mod info;
 mod levels;
+mod lod;
 mod man;
+mod method;
+mod morph;
 mod picture;
 mod problems;
 mod simplify;
@@ -38,6 +43,10 @@ enum Command {
     Simplify(Box<simplify::Args>),
     Info(info::Args),
     Levels(levels::Args),
+    Encode(Box<encode::Args>),
+    Decode(decode::Args),
+    Lod(Box<lod::Args>),
+    Morph(morph::Args),
     Compare(compare::Args),
     Convert(convert::Args),
     Generate(generate::Args),
@@ -105,6 +114,10 @@ pub(crate) fn main() -> ExitCode {
         Command::Simplify(args) => args.run(),
         Command::Info(args) => args.run(),
         Command::Levels(args) => args.run(),
+        Command::Encode(args) => args.run(),
+        Command::Decode(args) => args.run(),
+        Command::Lod(args) => args.run(),
+        Command::Morph(args) => args.run(),
         Command::Compare(args) => args.run(),
         Command::Convert(args) => args.run(),
         Command::Generate(args) => args.run(),

@@ -5,8 +5,10 @@
 //! first rename changes nothing. No `fsync`: the guarantee is against errors and interrupts, not against power loss.
 
 use super::{
-    DecodeError, Decoded, EncodeError, EncodeOptions, Encoded, Format, NoSide, Side, decode, encode,
+    DecodeError, Decoded, EncodeError, EncodeOptions, Encoded, Format, NoSide, Side, decode, encode, pm,
 };
+use crate::progressive::Detail;
+use crate::refine::format::Report;
 use crate::scene::Scene;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Write};
@@ -26,6 +28,22 @@ pub struct Loaded {
     pub format: Format,
     /// Its size.
     pub bytes: usize,
+    /// What it holds beside full detail, if it is a progressive mesh file.
+    pub progressive: Option<About>,
+}
+
+/// A progressive mesh file in numbers.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct About {
+    /// Triangles of the bases.
+    pub base_triangles: usize,
+    /// Splits of all meshes.
+    pub splits: usize,
+    /// Levels.
+    pub levels: usize,
+    /// Bytes by purpose, and losses; `None` for Hoppe's format.
+    pub report: Option<Report>,
 }
 
 /// Why a file could not be read. The caller knows its name.
@@ -33,7 +51,7 @@ pub struct Loaded {
 #[non_exhaustive]
 pub enum ReadError {
     /// Neither the name nor the caller says what it is.
-    #[error("the name does not tell the format; say it (obj, gltf, glb, ply, stl, off)")]
+    #[error("the name does not tell the format; say it (obj, gltf, glb, ply, stl, off, pm)")]
     UnknownFormat,
     /// The system refused.
     #[error("{0}")]
@@ -94,7 +112,9 @@ pub fn read(path: &Path, format: Option<Format>) -> Result<Loaded, ReadError> {
     let format =
         format.or_else(|| Format::from_name(&path.to_string_lossy())).ok_or(ReadError::UnknownFormat)?;
     let bytes = read_bytes(path).map_err(ReadError::Io)?;
+    let mut progressive = None;
     let decoded = match is_dash(path) {
+        _ if format == Format::Pm => at_full_detail(&bytes, &mut progressive),
         true => decode(format, &bytes, &NoSide),
         false => decode(format, &bytes, &Beside::of(path)),
     };
@@ -105,7 +125,26 @@ pub fn read(path: &Path, format: Option<Format>) -> Result<Loaded, ReadError> {
         }
         _ => ReadError::Decode(error),
     })?;
-    Ok(Loaded { decoded, format, bytes: bytes.len() })
+    Ok(Loaded { decoded, format, bytes: bytes.len(), progressive })
+}
+
+/// Decodes a progressive mesh file, and says what it holds.
+fn at_full_detail(bytes: &[u8], about: &mut Option<About>) -> Result<Decoded, DecodeError> {
+    let read = pm::decode_progressive(bytes)?;
+    let scene = read.scene.at(&read.scene.positions(Detail::Full)).map_err(pm::damage_of)?;
+    *about = Some(About {
+        base_triangles: read.scene.base_triangles(),
+        splits: read.scene.splits(),
+        levels: read.scene.levels(),
+        report: read.report,
+    });
+    Ok(Decoded { scene, warnings: read.warnings })
+}
+
+/// The bytes of a file, or of standard input for `-`.
+pub fn read_all(path: &Path) -> io::Result<Vec<u8>> {
+    check_source(path)?;
+    read_bytes(path)
 }
 
 /// Reads a mesh file by its extension: its scene, and the warnings.

@@ -11,6 +11,7 @@ pub(crate) mod notes;
 pub mod obj;
 pub mod off;
 pub mod ply;
+pub mod pm;
 pub mod stl;
 pub(crate) mod text;
 
@@ -31,6 +32,9 @@ pub enum Format {
     Stl,
     /// OFF.
     Off,
+    /// Progressive meshes: our own, or (to read) Hoppe's. [`pm`] reads them at any detail, [`decode`] at full; [`encode`] does not write them,
+    /// because a plain mesh has no splits: [`crate::pipeline::build_progressive`] makes some.
+    Pm,
 }
 
 /// Finds files that a file names: MTL, textures, buffers.
@@ -115,6 +119,9 @@ pub enum DecodeError {
         /// Its name.
         what: String,
     },
+    /// A progressive mesh file is damaged, or not one.
+    #[error(transparent)]
+    Progressive(#[from] crate::refine::format::FormatError),
     /// A file beside it could not be read.
     #[error("{name}: {why}")]
     Side {
@@ -150,17 +157,19 @@ impl Format {
             "ply" => Format::Ply,
             "stl" => Format::Stl,
             "off" => Format::Off,
+            "pm" => Format::Pm,
             _ => return None,
         })
     }
 
-    /// The format that a file's first bytes tell of beyond doubt: that of GLB, PLY, OFF, glTF. OBJ and STL have no mark.
+    /// The format that a file's first bytes tell of beyond doubt: that of GLB, PLY, OFF, glTF, PM. OBJ and STL have no mark.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         match text {
             [b'g', b'l', b'T', b'F', ..] => Some(Format::Glb),
             [b'p', b'l', b'y', b'\n' | b'\r', ..] => Some(Format::Ply),
             [b'O', b'F', b'F', b'\n' | b'\r' | b' ', ..] => Some(Format::Off),
+            _ if pm::looks_like(bytes) => Some(Format::Pm),
             _ if text.trim_ascii_start().first() == Some(&b'{') => Some(Format::Gltf),
             _ => None,
         }
@@ -175,6 +184,7 @@ impl Format {
             Format::Ply => "ply",
             Format::Stl => "stl",
             Format::Off => "off",
+            Format::Pm => "pm",
         }
     }
 }
@@ -189,6 +199,7 @@ pub fn decode(format: Format, bytes: &[u8], side: &dyn Side) -> Result<Decoded, 
         Format::Ply => ply::decode(bytes, side),
         Format::Stl => stl::decode(bytes),
         Format::Off => off::decode(bytes),
+        Format::Pm => pm::decode(bytes),
     }
 }
 
@@ -200,5 +211,9 @@ pub fn encode(format: Format, scene: &Scene, options: &EncodeOptions) -> Result<
         Format::Ply => ply::encode(scene, options),
         Format::Stl => stl::encode(scene, options),
         Format::Off => off::encode(scene, options),
+        Format::Pm => {
+            let what = "a mesh without splits; make them first (`encode` does)".into();
+            Err(EncodeError::CannotHold { format, what })
+        }
     }
 }

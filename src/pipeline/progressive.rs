@@ -1,9 +1,9 @@
 //! A whole scene as progressive meshes.
 
-use super::{Changes, Job, JobError, label, scale, world_scales};
-use crate::aif::{BuildOptions, Mesh, Weld};
+use super::{Changes, Job, JobError, count, label, scale, world_scales};
+use crate::aif::{BuildOptions, Mesh, MeshInput, Weld};
 use crate::normals::{self, Normals};
-use crate::progressive::{ProgressiveScene, shell_of};
+use crate::progressive::{Leftover, ProgressiveScene, shell_of};
 use crate::refine::progressive::{EncodeError, build_all};
 use crate::scene::Scene;
 use crate::simplify::{Control, Stop};
@@ -29,8 +29,8 @@ pub struct Refinable {
 
 /// Makes progressive meshes of all meshes of `scene`, in one simplification with a shared order of splits.
 ///
-/// Of the job it heeds the options, welding and normals. Without a target it goes as far as is legal. What building leaves out of a mesh
-/// (faces of no three corners) is not in the result, and said; all else comes back bit for bit at full detail.
+/// Of the job it heeds the options, welding and normals. Without a target it goes as far as is legal. Everything comes back bit for bit at full
+/// detail; faces without three distinct corners only there. Welding changes the input before; what it leaves out stays out.
 ///
 /// Errors: as [`super::simplify_scene`]; methods that are no sequence of edge collapses.
 pub fn build_progressive(scene: Scene, job: &Job, control: &dyn Control) -> Result<Refinable, JobError> {
@@ -42,6 +42,7 @@ pub fn build_progressive(scene: Scene, job: &Job, control: &dyn Control) -> Resu
     let (scales, mut scene) = (world_scales(&scene), scene);
     let mut changes = Changes::default();
     let mut meshes = Vec::with_capacity(scene.meshes.len());
+    let (mut leftovers, mut kept) = (Vec::new(), 0);
     let start = Instant::now();
     for i in 0..scene.meshes.len() {
         let label = label(&scene, i);
@@ -51,9 +52,24 @@ pub fn build_progressive(scene: Scene, job: &Job, control: &dyn Control) -> Resu
             input.validate().map_err(failed)?;
             normals::apply(&mut input, job.normals)?;
         }
+        // A copy only where building will change something.
+        let odd = job.weld == Weld::No && is_odd(&input);
+        let original = odd.then(|| input.clone());
         let (mesh, report) = Mesh::build(input, &BuildOptions::with_weld(job.weld)).map_err(failed)?;
-        changes.add(&label, &report, job.weld != Weld::No);
+        let left = original.map(|o| Leftover::find(&o, &mesh.to_input(), &report)).unwrap_or_default();
+        if left.is_empty() {
+            changes.add(&label, &report, job.weld != Weld::No);
+        }
+        kept += left.faces.len();
+        leftovers.push(left);
         meshes.push(mesh);
+    }
+    let mut warnings = changes.warnings();
+    if kept > 0 {
+        let faces = count(kept, "face");
+        warnings.push(format!(
+            "{faces} with fewer than three distinct corners, or one twice, are there at full detail only"
+        ));
     }
     let build_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
@@ -63,11 +79,35 @@ pub fn build_progressive(scene: Scene, job: &Job, control: &dyn Control) -> Resu
     })?;
     let estimate = built.estimates.iter().zip(&scales).map(|(e, s)| e * s).fold(0.0, f64::max);
     Ok(Refinable {
-        scene: ProgressiveScene { meshes: built.meshes, turns: built.turns, shell: shell_of(scene) },
+        scene: ProgressiveScene {
+            meshes: built.meshes,
+            turns: built.turns,
+            shell: shell_of(scene),
+            leftovers,
+        },
         stop: built.stop,
         estimate,
         build_seconds,
         simplify_seconds: start.elapsed().as_secs_f64(),
-        warnings: changes.warnings(),
+        warnings,
+    })
+}
+
+/// A face visits a vertex twice, or has no three corners. O(n).
+fn is_odd(input: &MeshInput) -> bool {
+    let odd = |f: &[u32]| match f {
+        [a, b, c] => a == b || b == c || c == a,
+        _ => {
+            let mut sorted = f.to_vec();
+            sorted.sort_unstable();
+            f.len() < 3 || sorted.windows(2).any(|w| w[0] == w[1])
+        }
+    };
+    let Some(sizes) = &input.face_sizes else { return input.corners.chunks_exact(3).any(odd) };
+    let mut rest = &input.corners[..];
+    sizes.iter().any(|&n| {
+        let (face, after) = rest.split_at((n as usize).min(rest.len()));
+        rest = after;
+        odd(face)
     })
 }

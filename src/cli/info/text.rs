@@ -1,9 +1,51 @@
 //! What `progmesh info` says to people.
 
-use super::{EdgeKinds, Info, MeshInfo, PartInfo, VertexKinds};
+use super::{EdgeKinds, Info, MeshInfo, PartInfo, ProgressiveInfo, VertexKinds};
 use crate::cli::common::{short, thousands};
 use progmesh::pipeline::count;
 use std::fmt::Write;
+
+impl ProgressiveInfo {
+    fn text(&self) -> String {
+        let mut s = format!(
+            "progressive: base of {} triangles, {} splits, {} levels; what follows is full detail\n",
+            thousands(self.base_triangles),
+            thousands(self.splits),
+            thousands(self.levels)
+        );
+        if let Some(b) = &self.streams {
+            let all = [
+                ("base", b.base),
+                ("connectivity", b.connectivity),
+                ("positions", b.positions),
+                ("attributes", b.attributes),
+                ("materials and groups", b.faces),
+                ("errors", b.errors),
+                ("order", b.order),
+                ("scene", b.scene),
+                ("directory", b.head),
+                ("other", b.other),
+            ];
+            let each: Vec<String> = all
+                .iter()
+                .filter(|x| x.1 > 0)
+                .map(|(what, n)| match *what {
+                    "base" | "order" | "scene" | "directory" | "other" => {
+                        format!("{what} {}", thousands(*n as usize))
+                    }
+                    _ => {
+                        let bits = 8.0 * *n as f64 / self.splits.max(1) as f64;
+                        format!("{what} {} ({bits:.1} bits a split)", thousands(*n as usize))
+                    }
+                })
+                .collect();
+            let chunks =
+                self.chunks.map_or(String::new(), |n| format!("; splits in {}", count(n as usize, "chunk")));
+            s += &format!("bytes: {}{chunks}\n", each.join(", "));
+        }
+        s
+    }
+}
 
 impl Info {
     /// For people.
@@ -11,6 +53,9 @@ impl Info {
         // Writing to a String cannot fail.
         let mut s = String::new();
         let _ = writeln!(s, "{}: {}, {} bytes", self.file, self.format, thousands(self.bytes));
+        if let Some(p) = &self.progressive {
+            s += &p.text();
+        }
         if self.nodes > 1 || self.meshes.len() != 1 {
             let _ = writeln!(
                 s,

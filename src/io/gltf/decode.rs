@@ -7,6 +7,7 @@ use super::{MESHOPT, container, images, vertices};
 use crate::io::{DecodeError, Decoded, Side};
 use crate::scene::{Node, Scene};
 use glam::{DMat4, DQuat, DVec3};
+use serde_json::Value;
 
 /// Required extensions that change nothing of what is read, and are written again as they were.
 const CARRIED: [&str; 12] = [
@@ -102,9 +103,25 @@ fn nodes(root: &At<'_>, meshes: usize) -> Result<(Vec<Node>, Vec<usize>), Decode
         let mesh = node.index("mesh", meshes, "meshes")?;
         out.push(Node { name: node.name(), transform: transform(node)?, mesh, children });
     }
-    let roots: Vec<usize> = (0..list.len()).filter(|&i| !has_parent[i]).collect();
+    let tops: Vec<usize> = (0..list.len()).filter(|&i| !has_parent[i]).collect();
+    // Nodes that stand for others at lower detail are not shown beside them.
+    let mut stands_in = vec![false; list.len()];
+    for node in &list {
+        let ids = node.value.pointer("/extensions/MSFT_lod/ids").and_then(Value::as_array);
+        for id in ids.into_iter().flatten() {
+            if let Some(other) = id.as_u64().and_then(|i| stands_in.get_mut(i as usize)) {
+                *other = true;
+            }
+        }
+    }
+    for (i, node) in out.iter_mut().enumerate() {
+        if stands_in[i] && !has_parent[i] {
+            node.mesh = None;
+        }
+    }
+    let roots = tops.iter().copied().filter(|&i| !stands_in[i]).collect();
     let mut reached = vec![false; list.len()];
-    let mut stack = roots.clone();
+    let mut stack = tops;
     while let Some(n) = stack.pop() {
         reached[n] = true;
         stack.extend(&out[n].children);

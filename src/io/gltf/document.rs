@@ -1,6 +1,6 @@
 //! A document for a scene that came from another format.
 
-use super::encode::Writer;
+use super::encode::{Placed, Writer};
 use super::geometry::{self, Shape};
 use super::{images, semantic};
 use crate::aif::Positions;
@@ -11,38 +11,28 @@ use glam::{DMat4, DVec3};
 use serde_json::{Map, Value, json};
 
 /// Makes the document of a scene without a source.
-pub(super) fn build(scene: &Scene, writer: &mut Writer) -> Result<Value, EncodeError> {
+pub(super) fn build(scene: &Scene, writer: &mut Writer) -> Result<(Value, Vec<Option<Placed>>), EncodeError> {
     let mut document = Map::new();
     let generator = concat!("progmesh ", env!("CARGO_PKG_VERSION"));
     document.insert("asset".into(), json!({"version": "2.0", "generator": generator}));
 
-    // Meshes; an index of `scene.meshes` -> index in the document, and how far its vertices were moved.
+    // Meshes; an index of `scene.meshes` -> where it is in the document.
     let mut meshes: Vec<Value> = Vec::new();
-    let mut placed: Vec<Option<(usize, DVec3)>> = Vec::new();
+    let mut placed: Vec<Option<Placed>> = Vec::new();
     for mesh in &scene.meshes {
         if has_named_groups(&mesh.geometry, &mesh.groups, mesh.name.as_deref()) {
             writer.warn("glTF has no groups inside a mesh: their names were left out".into());
         }
-        let (mesh, offset) = prepare(mesh, writer);
-        let written = geometry::primitives(&mesh, 0, true, writer)?;
-        if written.is_empty() {
+        let offset = offset_of(&mesh.geometry.positions);
+        let Some(json) = level(mesh, offset, scene.materials.len(), writer)? else {
             writer.warn(
                 "glTF cannot hold a mesh without faces, edges and vertices: its node stays without one"
                     .into(),
             );
             placed.push(None);
             continue;
-        }
-        placed.push(Some((meshes.len(), offset)));
-        let primitives: Vec<Value> = written
-            .into_iter()
-            .map(|w| {
-                debug_assert!(w.group.is_none() || w.shape == Shape::Triangles);
-                w.into_json(Map::new(), scene.materials.len())
-            })
-            .collect();
-        let mut json = named(mesh.name.as_deref());
-        json.insert("primitives".into(), Value::Array(primitives));
+        };
+        placed.push(Some(Placed { index: meshes.len(), offset }));
         meshes.push(Value::Object(json));
     }
     let mut nodes = nodes(scene, &placed);
@@ -73,7 +63,31 @@ pub(super) fn build(scene: &Scene, writer: &mut Writer) -> Result<Value, EncodeE
             document.insert(key.into(), Value::Array(list));
         }
     }
-    Ok(Value::Object(document))
+    Ok((Value::Object(document), placed))
+}
+
+/// The JSON of a mesh whose vertices are moved by `-offset`; `None` if there is nothing of it.
+pub(super) fn level(
+    mesh: &SceneMesh,
+    offset: DVec3,
+    materials: usize,
+    writer: &mut Writer,
+) -> Result<Option<Map<String, Value>>, EncodeError> {
+    let mesh = prepare(mesh, offset, writer);
+    let written = geometry::primitives(&mesh, 0, true, writer)?;
+    if written.is_empty() {
+        return Ok(None);
+    }
+    let primitives: Vec<Value> = written
+        .into_iter()
+        .map(|w| {
+            debug_assert!(w.group.is_none() || w.shape == Shape::Triangles);
+            w.into_json(Map::new(), materials)
+        })
+        .collect();
+    let mut json = named(mesh.name.as_deref());
+    json.insert("primitives".into(), Value::Array(primitives));
+    Ok(Some(json))
 }
 
 const EMISSIVE: &str = "KHR_materials_emissive_strength";
@@ -92,8 +106,20 @@ fn drop_empty(node: &mut Value) {
     }
 }
 
-/// The mesh as glTF wants it: v turned over, far-off f64 positions moved to the origin. Returns by how much they were moved.
-fn prepare(mesh: &SceneMesh, writer: &mut Writer) -> (SceneMesh, DVec3) {
+/// By how much to move f64 positions: where the mesh is farther away than it is large, moving gains bits.
+fn offset_of(positions: &Positions) -> DVec3 {
+    match (positions, positions.bounds()) {
+        (Positions::F64(_), Some((lo, hi))) => {
+            let center = (lo + hi) / 2.0;
+            let far = center.abs().max_element() > (hi - lo).max_element();
+            if far { center } else { DVec3::ZERO }
+        }
+        _ => DVec3::ZERO,
+    }
+}
+
+/// The mesh as glTF wants it: v turned over, far-off f64 positions moved by `-offset`.
+fn prepare(mesh: &SceneMesh, offset: DVec3, writer: &mut Writer) -> SceneMesh {
     let mut mesh = mesh.clone();
     if let Some(w) = &mut mesh.geometry.wedges {
         turn_v_over(w);
@@ -105,22 +131,18 @@ fn prepare(mesh: &SceneMesh, writer: &mut Writer) -> (SceneMesh, DVec3) {
             }
         }
     }
-    let Positions::F64(points) = &mesh.geometry.positions else { return (mesh, DVec3::ZERO) };
-    let Some((lo, hi)) = mesh.geometry.positions.bounds() else { return (mesh, DVec3::ZERO) };
-    let center = (lo + hi) / 2.0;
-    // Moving gains bits only where the mesh is farther away than it is large.
-    let offset = if center.abs().max_element() > (hi - lo).max_element() { center } else { DVec3::ZERO };
+    let Positions::F64(points) = &mesh.geometry.positions else { return mesh };
     let moved: Vec<[f64; 3]> = points.iter().map(|&p| (DVec3::from_array(p) - offset).to_array()).collect();
     let worst = moved.iter().flatten().map(|&x| (x - x as f32 as f64).abs()).fold(0.0, f64::max);
     if worst > 0.0 {
         writer.warn(format!("glTF positions are f32: coordinates were rounded, by {worst:.1e} at most"));
     }
     mesh.geometry.positions = Positions::F64(moved);
-    (mesh, offset)
+    mesh
 }
 
 /// The nodes. One whose mesh was moved gets a child that moves it back; its own children stay where they are.
-fn nodes(scene: &Scene, placed: &[Option<(usize, DVec3)>]) -> Vec<Value> {
+fn nodes(scene: &Scene, placed: &[Option<Placed>]) -> Vec<Value> {
     let mut out: Vec<Value> = Vec::new();
     let mut extra: Vec<Value> = Vec::new();
     for node in &scene.nodes {
@@ -128,7 +150,8 @@ fn nodes(scene: &Scene, placed: &[Option<(usize, DVec3)>]) -> Vec<Value> {
         let mut children: Vec<usize> =
             node.children.iter().copied().filter(|&c| c < scene.nodes.len()).collect();
         let mut transform = node.transform;
-        if let Some((mesh, offset)) = node.mesh.and_then(|m| placed.get(m).copied().flatten()) {
+        if let Some(Placed { index: mesh, offset }) = node.mesh.and_then(|m| placed.get(m).copied().flatten())
+        {
             if offset == DVec3::ZERO || children.is_empty() {
                 transform *= DMat4::from_translation(offset);
                 json.insert("mesh".into(), json!(mesh));

@@ -2,9 +2,11 @@
 
 use super::geometry::{self, Shape};
 use super::json::array_mut;
+use super::source::Surface;
 use super::{container, document, images};
 use crate::io::{EncodeError, EncodeOptions, Encoded, Format};
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneMesh};
+use glam::DVec3;
 use serde_json::{Map, Value, json};
 
 /// Encodes a scene as `.glb` ([`Format::Glb`]) or as `.gltf` with a `<stem>.bin` beside it.
@@ -20,13 +22,7 @@ use serde_json::{Map, Value, json};
 /// Errors: a position that is not finite in f32; more than 4 GiB.
 pub fn encode(scene: &Scene, format: Format, options: &EncodeOptions) -> Result<Encoded, EncodeError> {
     let mut writer = Writer::new(format);
-    let mut document = match &scene.gltf {
-        Some(source) => patch(scene, source, &mut writer)?,
-        None => document::build(scene, &mut writer)?,
-    };
-    if let (Some(_), Value::Object(document)) = (&scene.gltf, &mut document) {
-        images::place(document, scene, &mut writer);
-    }
+    let (mut document, _) = begin(scene, &mut writer)?;
     if let Some(Value::Object(first)) =
         document.pointer_mut("/scenes/0").filter(|_| !options.facts.is_empty())
     {
@@ -36,6 +32,54 @@ pub fn encode(scene: &Scene, format: Format, options: &EncodeOptions) -> Result<
         }
     }
     writer.finish(document, options)
+}
+
+/// Where a mesh of a scene is in the document.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed {
+    /// Its index there.
+    pub(super) index: usize,
+    /// By how much its vertices were moved.
+    pub(super) offset: DVec3,
+}
+
+/// The document of a scene, and where its meshes are in it; what else belongs to the file is in `writer`.
+pub(super) fn begin(scene: &Scene, writer: &mut Writer) -> Result<(Value, Vec<Option<Placed>>), EncodeError> {
+    let Some(source) = &scene.gltf else { return document::build(scene, writer) };
+    let mut document = patch(scene, source, writer)?;
+    let mut placed = Vec::new();
+    if let Value::Object(document) = &mut document {
+        images::place(document, scene, writer);
+        let there = document.get("meshes").and_then(Value::as_array).map_or(0, Vec::len);
+        let place = |index| (index < there).then_some(Placed { index, offset: DVec3::ZERO });
+        placed = (0..scene.meshes.len()).map(place).collect();
+    }
+    Ok((document, placed))
+}
+
+/// The JSON of mesh `m` of `scene` at another level of detail, `mesh`; `None` if nothing is left of it. `document` is what [`begin`] made of
+/// `scene`.
+pub(super) fn add_level(
+    document: &Map<String, Value>,
+    scene: &Scene,
+    m: usize,
+    mesh: &SceneMesh,
+    place: &Placed,
+    writer: &mut Writer,
+) -> Result<Option<Map<String, Value>>, EncodeError> {
+    let Some(source) = &scene.gltf else {
+        return document::level(mesh, place.offset, scene.materials.len(), writer);
+    };
+    let materials = document.get("materials").and_then(Value::as_array).map_or(0, Vec::len);
+    let original = source.document.get("meshes").and_then(|v| v.get(m)).and_then(Value::as_object);
+    let Some(mut json) = original.cloned() else { return Ok(None) };
+    let surfaces = source.surfaces.get(m).map_or(&[][..], Vec::as_slice);
+    let old = std::mem::take(array_mut(&mut json, "primitives"));
+    // Points and lines are no surface, and stay at every level.
+    let done = replace_surfaces(old, surfaces, Some(mesh), materials, writer)?;
+    let nothing = done.hollow || done.primitives.is_empty();
+    *array_mut(&mut json, "primitives") = done.primitives;
+    Ok((!nothing).then_some(json))
 }
 
 /// The source's document with the scene's meshes.
@@ -57,39 +101,11 @@ fn patch(scene: &Scene, source: &super::Source, writer: &mut Writer) -> Result<V
     for (m, json) in meshes.iter_mut().enumerate() {
         let Some(mesh) = json.as_object_mut() else { continue };
         let surfaces = source.surfaces.get(m).map_or(&[][..], Vec::as_slice);
-        let targets = surfaces.iter().flatten().map(|s| s.targets).max().unwrap_or(0);
-        let mut written = match scene.meshes.get(m) {
-            Some(scene_mesh) => geometry::primitives(scene_mesh, targets, false, writer)?,
-            None => Vec::new(),
-        };
         let old = std::mem::take(array_mut(mesh, "primitives"));
-        let mut new = Vec::new();
-        let mut template = None;
-        for (p, primitive) in old.into_iter().enumerate() {
-            let Some(surface) = surfaces.get(p).and_then(Option::as_ref) else {
-                new.push(primitive);
-                continue;
-            };
-            let mut found = false;
-            for part in written.extract_if(.., |w| w.group == Some(p as u32) && w.shape == Shape::Triangles) {
-                new.push(part.into_json(primitive.as_object().cloned().unwrap_or_default(), materials));
-                found = true;
-            }
-            lost += !found as usize;
-            template.get_or_insert((primitive, surface));
-        }
-        // Faces of no primitive of the document, and wires.
-        new.extend(written.into_iter().map(|w| w.into_json(Map::new(), materials)));
-        if new.is_empty()
-            && let Some((primitive, surface)) = template
-        {
-            hollow += 1;
-            let body = primitive.as_object().cloned().unwrap_or_default();
-            new.push(
-                geometry::hollow(&surface.attributes, surface.targets, writer).into_json(body, materials),
-            );
-        }
-        *array_mut(mesh, "primitives") = new;
+        let done = replace_surfaces(old, surfaces, scene.meshes.get(m), materials, writer)?;
+        lost += done.lost;
+        hollow += done.hollow as usize;
+        *array_mut(mesh, "primitives") = done.primitives;
     }
     if lost > 0 {
         writer.warn(format!("{lost} primitives have no faces left and were left out; their materials stay"));
@@ -101,6 +117,57 @@ fn patch(scene: &Scene, source: &super::Source, writer: &mut Writer) -> Result<V
         object.shift_remove("meshes");
     }
     Ok(document)
+}
+
+/// The primitives of a mesh with new surfaces.
+struct Replaced {
+    primitives: Vec<Value>,
+    /// Primitives that have no faces left.
+    lost: usize,
+    /// Nothing was left: a triangle without area stands for all.
+    hollow: bool,
+}
+
+/// Puts the surfaces of `mesh` in the place of those of a document's primitives.
+fn replace_surfaces(
+    old: Vec<Value>,
+    surfaces: &[Option<Surface>],
+    mesh: Option<&SceneMesh>,
+    materials: usize,
+    writer: &mut Writer,
+) -> Result<Replaced, EncodeError> {
+    let targets = surfaces.iter().flatten().map(|s| s.targets).max().unwrap_or(0);
+    let mut written = match mesh {
+        Some(mesh) => geometry::primitives(mesh, targets, false, writer)?,
+        None => Vec::new(),
+    };
+    let mut out = Replaced { primitives: Vec::new(), lost: 0, hollow: false };
+    let mut template = None;
+    for (p, primitive) in old.into_iter().enumerate() {
+        let Some(surface) = surfaces.get(p).and_then(Option::as_ref) else {
+            out.primitives.push(primitive);
+            continue;
+        };
+        let mut found = false;
+        for part in written.extract_if(.., |w| w.group == Some(p as u32) && w.shape == Shape::Triangles) {
+            out.primitives
+                .push(part.into_json(primitive.as_object().cloned().unwrap_or_default(), materials));
+            found = true;
+        }
+        out.lost += !found as usize;
+        template.get_or_insert((primitive, surface));
+    }
+    // Faces of no primitive of the document, and wires.
+    out.primitives.extend(written.into_iter().map(|w| w.into_json(Map::new(), materials)));
+    if out.primitives.is_empty()
+        && let Some((primitive, surface)) = template
+    {
+        out.hollow = true;
+        let body = primitive.as_object().cloned().unwrap_or_default();
+        out.primitives
+            .push(geometry::hollow(&surface.attributes, surface.targets, writer).into_json(body, materials));
+    }
+    Ok(out)
 }
 
 /// Collects accessors, buffer views and bytes.
@@ -217,7 +284,11 @@ impl Writer {
     }
 
     /// Puts views, accessors and the buffer into the document and wraps it up.
-    fn finish(mut self, mut document: Value, options: &EncodeOptions) -> Result<Encoded, EncodeError> {
+    pub(super) fn finish(
+        mut self,
+        mut document: Value,
+        options: &EncodeOptions,
+    ) -> Result<Encoded, EncodeError> {
         let Some(object) = document.as_object_mut() else {
             return Err(self.cannot_hold("a document that is no JSON object"));
         };

@@ -27,6 +27,7 @@ mod encode;
 mod geometry;
 mod images;
 mod json;
+mod lod;
 mod meshopt;
 mod semantic;
 mod source;
@@ -34,6 +35,7 @@ mod vertices;
 
 pub use decode::decode;
 pub use encode::encode;
+pub use lod::encode_levels;
 pub use source::Source;
 
 use serde_json::Value;

@@ -63,6 +63,29 @@ impl Source {
         &self.document
     }
 
+    /// The bytes of all its buffer views.
+    pub(crate) fn binary(&self) -> &[u8] {
+        &self.binary
+    }
+
+    /// For every mesh and primitive what it held, if it was a surface: attribute names, number of morph targets.
+    pub(crate) fn surface_table(&self) -> Vec<Vec<Option<(Vec<String>, usize)>>> {
+        let of = |s: &Option<Surface>| s.as_ref().map(|s| (s.attributes.clone(), s.targets));
+        self.surfaces.iter().map(|m| m.iter().map(of).collect()).collect()
+    }
+
+    /// What [`Source::document`], [`Source::binary`] and [`Source::surface_table`] told of; `None` if the document is no object.
+    pub(crate) fn from_table(
+        document: Value,
+        binary: Vec<u8>,
+        surfaces: Vec<Vec<Option<(Vec<String>, usize)>>>,
+    ) -> Option<Self> {
+        let of =
+            |s: Option<(Vec<String>, usize)>| s.map(|(attributes, targets)| Surface { attributes, targets });
+        let surfaces = surfaces.into_iter().map(|m| m.into_iter().map(of).collect()).collect();
+        document.is_object().then_some(Source { document, binary, surfaces })
+    }
+
     /// Strips `document`, which has been decoded without error.
     pub(super) fn new(
         original: &Value,
