@@ -288,7 +288,8 @@ fn levels_come_from_any_mesh_and_into_separate_files() {
         ["out.lod0.glb", "out.lod1.glb", "out.lod2.glb"].iter().all(|f| p.exists(f)) && !p.exists("out.glb")
     );
     assert!(document(&p.read("out.lod1.glb"))["extensionsUsed"].is_null());
-    p.done("lod in.ply out.gltf --levels 500,50 -q");
+    p.done("lod in.ply out.gltf --levels 500,50 -q --png levels.png");
+    assert!(p.read("levels.png").starts_with(b"\x89PNG"));
     assert!(p.text("out.gltf").contains("MSFT_lod"));
     p.run("lod in.ply out.obj --levels 0.5").failed(2, "written as .glb or .gltf");
     p.run("lod in.ply out.glb --levels 0.2,0.5").failed(2, "fewer triangles than the one before");

@@ -538,13 +538,14 @@ struct Morph {
 fn progressive_commands_print_one_object_with_the_documented_fields() {
     let p = Place::new();
     p.generate("torus", "in.obj", 600);
+    let count = p.done("info in.obj --json").json()["triangles"]["file"].as_u64().unwrap() as usize;
     let of = |arguments: &str| p.done(arguments).stdout;
     let e: Encode = serde_json::from_str(&of("encode in.obj in.pm --json")).unwrap();
-    assert_eq!((e.command.as_str(), e.method.as_str(), e.triangles), ("encode", "quadric", 600));
+    assert_eq!((e.command.as_str(), e.method.as_str(), e.triangles), ("encode", "quadric", count));
     assert_eq!(e.bytes, p.read("in.pm").len());
-    assert!(e.base_triangles < 600 && e.splits > 200 && e.quantization_error.is_none());
+    assert!(e.base_triangles < count && e.splits > 200 && e.quantization_error.is_none());
     let d: Decode = serde_json::from_str(&of("decode in.pm out.ply --triangles 300 --json")).unwrap();
-    assert_eq!((d.command.as_str(), d.to.as_str(), d.full_triangles), ("decode", "ply", 600));
+    assert_eq!((d.command.as_str(), d.to.as_str(), d.full_triangles), ("decode", "ply", count));
     assert!(d.triangles <= 300 && d.splits < d.full_splits && d.full_splits == e.splits);
     let l: Lod = serde_json::from_str(&of("lod in.pm out.glb --levels 0.5 --json")).unwrap();
     assert_eq!((l.command.as_str(), l.levels.len(), l.levels[1].coverage), ("lod", 2, Some(0.0)));
@@ -610,7 +611,8 @@ fn levels_prints_one_object_with_the_documented_fields() {
     p.generate("torus", "in.obj", 600);
     let run = p.done("levels in.obj --json --runs 1 --samples 1000 --epsilon 60");
     let l: Levels = serde_json::from_str(&run.stdout).unwrap();
-    assert_eq!((l.command.as_str(), l.faces, l.threads, l.runs), ("levels", 600, 1, 1));
+    assert_eq!((l.command.as_str(), l.threads, l.runs), ("levels", 1, 1));
+    assert!(l.faces > 500 && l.diagonal > 0.0);
     assert!(l.methods.iter().all(|m| !m.levels.is_empty() && m.levels[0].level == 1));
     let run = p.done("levels in.obj --json --runs 1 --samples 0 --method nsa");
     let l: Levels = serde_json::from_str(&run.stdout).unwrap();

@@ -37,6 +37,54 @@ pub enum SplitKind {
     Explicit,
 }
 
+/// What a [`SplitCode`] says, part by part; its methods say what each means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SplitParts {
+    /// [`SplitCode::left`].
+    pub left: (usize, bool),
+    /// [`SplitCode::right`]; `None` for a split that makes one face.
+    pub right: Option<(usize, bool)>,
+    /// [`SplitCode::left_inner`].
+    pub left_inner: bool,
+    /// [`SplitCode::left_starts`].
+    pub left_starts: bool,
+    /// [`SplitCode::right_inner`].
+    pub right_inner: bool,
+    /// [`SplitCode::left_tip_inner`].
+    pub left_tip_inner: bool,
+    /// [`SplitCode::right_tip_inner`].
+    pub right_tip_inner: bool,
+    /// [`SplitCode::kind`].
+    pub kind: SplitKind,
+    /// [`SplitCode::moves`].
+    pub moves: bool,
+    /// [`SplitCode::changes_rows`].
+    pub changes_rows: bool,
+}
+
+impl From<SplitParts> for SplitCode {
+    fn from(p: SplitParts) -> SplitCode {
+        let arrangement = |(tip, vu_next): (usize, bool)| (tip % 3) as u16 + 3 * vu_next as u16;
+        let flags = [
+            (p.right.is_some(), SplitCode::TWO_FACES),
+            (p.left_inner, SplitCode::L_INNER),
+            (p.left_starts, SplitCode::L_STARTS),
+            (p.right_inner, SplitCode::R_INNER),
+            (p.left_tip_inner, SplitCode::L_TIP_INNER),
+            (p.right_tip_inner, SplitCode::R_TIP_INNER),
+            (p.moves, SplitCode::MOVES),
+            (p.changes_rows, SplitCode::ROWS),
+        ];
+        let kind = match p.kind {
+            SplitKind::Plain => 0,
+            SplitKind::Seam => 1,
+            SplitKind::Explicit => 2,
+        };
+        let bits = flags.iter().filter(|f| f.0).fold(0, |sum, f| sum | f.1);
+        SplitCode(bits | kind << SplitCode::KIND | arrangement(p.left) | p.right.map_or(0, arrangement) << 3)
+    }
+}
+
 impl SplitCode {
     pub(crate) const TWO_FACES: u16 = 1 << 6;
     pub(crate) const L_INNER: u16 = 1 << 7;
@@ -188,7 +236,8 @@ pub struct WedgeStreams {
     /// For every row the channels it has, bit k for channel k; a wedge that has none stands for "no attributes".
     pub present: Vec<u64>,
     /// For every explicit split: the number of pairs, of changed wedges; pairs (wedge before, wedge after) of the faces that go to the
-    /// new vertex, with new wedges numbered from the present count; the changed wedges; the wedges of `fl` at `vt`, `vu`, `vl` (the last
+    /// new vertex, with new wedges numbered from the present count (a new wedge belongs to the new vertex, unless the new faces have it at
+    /// the old vertex or at the tip: it is that vertex's then, and its first number any wedge of before); the changed wedges; the wedges of `fl` at `vt`, `vu`, `vl` (the last
     /// [`NONE`] where the neighbour that the code names has it); the same of `fr` if there is one.
     pub explicit: Vec<u32>,
 }

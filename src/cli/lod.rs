@@ -5,10 +5,12 @@ use super::args::{self, Input, Output};
 use super::common::{self, Warnings, short, thousands};
 use super::control::{Interrupt, Progress};
 use super::method::Making;
+use super::picture::{Drawing, PictureArgs};
 use progmesh::io::gltf::encode_levels;
 use progmesh::io::{Format, files};
 use progmesh::pipeline::build_progressive;
 use progmesh::progressive::{Detail, ProgressiveScene};
+use progmesh::report::SurfaceError;
 use progmesh::scene::Scene;
 use progmesh::simplify::Stop;
 use serde::Serialize;
@@ -43,6 +45,8 @@ pub(crate) struct Args {
     separate: bool,
     #[command(flatten)]
     making: Making,
+    #[command(flatten)]
+    picture: PictureArgs,
     /// Print one JSON object about the run on standard output (see docs/json.md)
     #[arg(long)]
     json: bool,
@@ -86,6 +90,7 @@ impl Args {
         if !self.coverage.is_sorted_by(|a, b| a > b) {
             return Err(Failure::Usage("--coverage: the largest comes first".into()));
         }
+        let mut drawing = self.picture.drawing()?;
         let file = self.input.name();
         let interrupt = Interrupt::watch();
         let report = common::in_pool(self.making.threads, || {
@@ -101,7 +106,13 @@ impl Args {
                 Ok(built.scene)
             })?;
             interrupt.be_graceful();
-            self.write(&read, &output, format, &file, &interrupt, &mut warnings)
+            let scenes = self.scenes(&read, &file, &interrupt, &mut warnings)?;
+            if let Some(d) = &mut drawing {
+                draw(d, &scenes).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+            }
+            let report = self.write(&scenes, &output, format, &interrupt, &mut warnings)?;
+            drawing.as_mut().map_or(Ok(()), Drawing::write)?;
+            Ok(report)
         })?;
         let report = Report { warnings: warnings.all, ..report };
         if !self.quiet {
@@ -122,15 +133,14 @@ impl Args {
         if self.json { common::print_json(&report) } else { Ok(()) }
     }
 
-    fn write(
+    /// The levels, finest first.
+    fn scenes(
         &self,
         read: &ProgressiveScene,
-        output: &Output,
-        format: Format,
         file: &str,
         interrupt: &Interrupt,
         warnings: &mut Warnings,
-    ) -> Result<Report, Failure> {
+    ) -> Result<Vec<Scene>, Failure> {
         let full = read.triangles();
         let mut scenes: Vec<Scene> = Vec::new();
         let details = self.levels.iter().map(|l| match *l {
@@ -159,6 +169,18 @@ impl Args {
                 return Err(Failure::Interrupted);
             }
         }
+        Ok(scenes)
+    }
+
+    /// Writes them, and says what was written.
+    fn write(
+        &self,
+        scenes: &[Scene],
+        output: &Output,
+        format: Format,
+        interrupt: &Interrupt,
+        warnings: &mut Warnings,
+    ) -> Result<Report, Failure> {
         let triangles: Vec<usize> = scenes.iter().map(Scene::unique_triangles).collect();
         let mut levels: Vec<LevelReport> = triangles
             .iter()
@@ -173,7 +195,7 @@ impl Args {
         } else {
             let coverage = self.thresholds(&triangles);
             let options = files::encode_options(&self.output, false);
-            let encoded = encode_levels(&scenes, &coverage, format, &options);
+            let encoded = encode_levels(scenes, &coverage, format, &options);
             let encoded = encoded.map_err(|e| Failure::Output(format!("{}: {e}", output.name())))?;
             common::write_encoded(&self.output, format, &encoded, interrupt, warnings)?;
             levels.iter_mut().zip(coverage).for_each(|(l, c)| l.coverage = Some(c));
@@ -191,6 +213,11 @@ impl Args {
         let next = triangles.iter().skip(1).map(|&t| 0.5 * t as f64 / full);
         next.chain([0.0]).collect()
     }
+}
+
+/// All levels side by side, from one camera.
+fn draw(drawing: &mut Drawing, scenes: &[Scene]) -> Result<(), SurfaceError> {
+    scenes.iter().try_for_each(|s| drawing.add(s))
 }
 
 /// The schema of `--json`; docs/json.md says what each field means.

@@ -174,7 +174,7 @@ fn draw(chart: &Chart, s: &mut String) {
 /// `0.001`, `20`, `5k`, `1M`, `1e-7`.
 fn number(v: f64) -> String {
     match v {
-        _ if v >= 1e9 || v < 1e-4 => format!("{v:e}"),
+        _ if !(1e-4..1e9).contains(&v) => format!("{v:e}"),
         _ if v >= 1e6 => format!("{}M", (v / 1e6).round()),
         _ if v >= 1e3 => format!("{}k", (v / 1e3).round()),
         _ => super::short(v),

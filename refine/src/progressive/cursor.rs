@@ -340,6 +340,15 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
                 moved.for_each(|p| state.vertex[p.1 as usize] = vu);
             }
             state.apply(streams, vu, new, changed);
+            // Of an explicit split's new wedges some may belong to the old vertex, or to a tip.
+            for (c, tip) in explicit.corners.iter().zip(tips) {
+                if c[0] >= w {
+                    state.vertex[c[0] as usize] = vs;
+                }
+                if c[2] >= w && c[2] != NONE && tip != NONE {
+                    state.vertex[c[2] as usize] = state.vertex[tip as usize];
+                }
+            }
         }
         if let Some(from) = &mut self.descent {
             let own = [(x[0], w), (x[1], w + 1)];
@@ -396,13 +405,13 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
         let right = if two { self.fans.opening_of(fl + 1, code.right()) } else { Opening::default() };
         let (x_l, y_l) = self.fans.ends_of(fl, code.left());
         let x_r = if two { self.fans.ends_of(fl + 1, code.right()).0 } else { x_l };
-        let vu = self.positions.len() as u32 - 1;
         let mut explicit = Explicit::default();
         if let (SplitKind::Explicit, Some(streams), Some(state)) = (code.kind(), &pm.wedges, &mut self.wedges)
         {
             state.next_explicit = state.explicit_starts.pop().unwrap_or(0) as usize;
-            let new = state.vertex.iter().rev().take_while(|&&v| v == vu).count();
-            // Of the wedges at the end, those of the new vertex that were there before it are counted too: the least count that reads is right.
+            // The largest number of new wedges that reads is right: with more, some pair would name a wedge that was not there yet.
+            let pairs = streams.explicit.get(state.next_explicit).copied().unwrap_or(0) as usize;
+            let new = pairs.min(state.vertex.len());
             let before = |n: usize| (state.vertex.len() - n) as u32;
             let read = |n| {
                 Explicit::read(&streams.explicit, state.next_explicit, two, before(n)).filter(|e| e.new == n)

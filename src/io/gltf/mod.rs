@@ -37,6 +37,7 @@ pub use decode::decode;
 pub use encode::encode;
 pub use lod::encode_levels;
 pub use source::Source;
+pub(crate) use source::SurfaceTable;
 
 use serde_json::Value;
 

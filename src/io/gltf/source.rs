@@ -31,6 +31,9 @@ pub(super) struct Surface {
     pub(super) targets: usize,
 }
 
+/// For every mesh and primitive what it held, if it was a surface: attribute names, number of morph targets.
+pub(crate) type SurfaceTable = Vec<Vec<Option<(Vec<String>, usize)>>>;
+
 /// Extensions of a primitive that describe its old triangles.
 const OF_OLD_TRIANGLES: [&str; 4] = [
     "KHR_draco_mesh_compression",
@@ -68,18 +71,14 @@ impl Source {
         &self.binary
     }
 
-    /// For every mesh and primitive what it held, if it was a surface: attribute names, number of morph targets.
-    pub(crate) fn surface_table(&self) -> Vec<Vec<Option<(Vec<String>, usize)>>> {
+    /// What its surfaces held.
+    pub(crate) fn surface_table(&self) -> SurfaceTable {
         let of = |s: &Option<Surface>| s.as_ref().map(|s| (s.attributes.clone(), s.targets));
         self.surfaces.iter().map(|m| m.iter().map(of).collect()).collect()
     }
 
     /// What [`Source::document`], [`Source::binary`] and [`Source::surface_table`] told of; `None` if the document is no object.
-    pub(crate) fn from_table(
-        document: Value,
-        binary: Vec<u8>,
-        surfaces: Vec<Vec<Option<(Vec<String>, usize)>>>,
-    ) -> Option<Self> {
+    pub(crate) fn from_table(document: Value, binary: Vec<u8>, surfaces: SurfaceTable) -> Option<Self> {
         let of =
             |s: Option<(Vec<String>, usize)>| s.map(|(attributes, targets)| Surface { attributes, targets });
         let surfaces = surfaces.into_iter().map(|m| m.into_iter().map(of).collect()).collect();

@@ -4,7 +4,7 @@
 //! offsets counted from the end of the object. Geometry is not here: it is in the meshes' own chunks.
 
 use crate::io::DecodeError;
-use crate::io::gltf::Source;
+use crate::io::gltf::{Source, SurfaceTable};
 use crate::progressive::Leftover;
 use crate::scene::{Group, Image, Material, Node, Scene, SceneMesh};
 use glam::DMat4;
@@ -110,7 +110,7 @@ struct GltfShell {
     /// The bytes of its buffer views.
     binary: Span,
     /// For every mesh and primitive what it held, if it is a surface: attribute names, number of morph targets.
-    surfaces: Vec<Vec<Option<(Vec<String>, usize)>>>,
+    surfaces: SurfaceTable,
 }
 
 /// The error of a named part.
