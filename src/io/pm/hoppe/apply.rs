@@ -191,7 +191,8 @@ impl Builder {
         let mut last = named;
         while !r.two_faces() || inner.len() + 1 < r.between as usize {
             match self.turn(last, 2, vs)? {
-                Some(next) if next.0 == r.face || Some(next) == l_ccw => {
+                // More than all faces: a fan that runs in a circle beside its vertex.
+                Some(next) if next.0 == r.face || Some(next) == l_ccw || inner.len() >= self.faces.len() => {
                     return Err("its cuts are not as far apart as it says");
                 }
                 Some(next) => {
