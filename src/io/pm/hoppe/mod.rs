@@ -2,6 +2,9 @@
 //!
 //! His records add deltas to positions, normals, colours and texture coordinates; they are evaluated once, from the base upward in f32, and what came of it is kept outright,
 //! so that refining and coarsening are exact here. Faces, vertices and wedges keep his numbers at every split count.
+//!
+//! Not guaranteed: that the splits can be put into another order, as our own files do. His records may make wedges at vertices beside the split one,
+//! which our dependencies do not know of. `progmesh encode` makes new splits of the mesh at full detail.
 
 mod apply;
 mod read;
