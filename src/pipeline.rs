@@ -280,6 +280,10 @@ fn run(mut scene: Scene, job: &Job, control: &dyn Control) -> Result<(Scene, Sum
     }
     let mut outcomes = Vec::with_capacity(meshes.len());
     if job.per_mesh {
+        // By the size of the whole scene, as if its meshes were simplified together.
+        if triangles_in > simplify::REFIT_LIMIT {
+            options.refit.get_or_insert(0);
+        }
         let mut done = 0;
         for (i, mesh) in meshes.iter_mut().enumerate() {
             let mut own = options.clone();

@@ -38,7 +38,7 @@ pub(crate) struct Candidate {
 /// A mesh with quadrics on its vertices.
 pub(crate) struct Collapser<'m> {
     pub(crate) work: Work<'m>,
-    quadrics: Vec<Quadric>,
+    pub(crate) quadrics: Vec<Quadric>,
     placement: Placement,
     /// Largest cost per weight so far, local units.
     pub(crate) worst: f64,
@@ -52,7 +52,7 @@ pub(crate) struct Collapser<'m> {
     pub(crate) refused: Refused,
     /// Edges that the kinds of their vertices forbid, as last counted.
     pub(crate) locked_edges: u64,
-    wedges: WedgeMerge,
+    pub(crate) wedges: WedgeMerge,
     scratch: Scratch,
     /// Where collapses are written down, if they are.
     pub(crate) log: Option<CollapseLog>,
@@ -429,6 +429,9 @@ impl Work<'_> {
         if self.points[k] != to {
             self.points[k] = to;
             self.moved.set(k);
+        }
+        if let Some(into) = self.into.get_mut(roles.removed.index()) {
+            *into = roles.kept.0;
         }
         debug_assert!(self.kinds[roles.removed.index()] != Kind::Pinned);
         record

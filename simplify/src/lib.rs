@@ -22,6 +22,7 @@ mod parallel;
 mod quadric;
 mod quadric_collapse;
 mod radix_heap;
+mod refit;
 mod thin;
 mod validity;
 mod wedges;
@@ -29,6 +30,7 @@ mod work;
 
 pub use log::{CollapseLog, LoggedCollapse, LoggedWing, Recorded, record_all};
 pub use options::*;
+pub use refit::REFIT_LIMIT;
 
 use progmesh_aif::Mesh;
 

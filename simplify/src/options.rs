@@ -61,6 +61,10 @@ pub struct Options {
     pub ratio: Option<f64>,
     /// Stop before the estimated error passes this. An estimate, not a proof.
     pub max_error: Option<MaxError>,
+    /// Quadric method with optimal placement: sweeps that move the vertices of the result to where the surface lies closest to the input, after the
+    /// collapses. Topology, locks, seams and the error bound hold; more than two gain little. `None`: 2 if the input has at most
+    /// [`crate::REFIT_LIMIT`] triangles, else 0. Recorded runs ([`crate::record_all`]), other methods and other placements make none.
+    pub refit: Option<usize>,
     /// NSA: largest turn of a face's normal, degrees. `None`: [`crate::nsa::DEFAULT_EPSILON`].
     pub epsilon: Option<f64>,
     /// NSA: at most this many passes.

@@ -5,6 +5,7 @@ use crate::finish::{Before, finish, target};
 use crate::log::{CollapseLog, Recorded};
 use crate::options::{Control, Level, Options, Outcome, Schedule, SimplifyError, Stop};
 use crate::parallel::with_threads;
+use crate::refit::{self, Original};
 use crate::work::Work;
 use crate::{bulk, exact};
 use progmesh_aif::{Bits, Mesh};
@@ -81,12 +82,24 @@ fn run_all(
     };
     let factors: Vec<f64> = collapsers.iter().zip(scales).map(common).collect();
     let goal = exact::Goal { triangles: target(options, total), first: total };
+    let sweeps = if logged { 0 } else { refit::sweeps(options, total) };
+    let originals: Vec<Original> = match sweeps {
+        0 => Vec::new(),
+        _ => collapsers.iter_mut().map(|c| Original::of(&mut c.work)).collect(),
+    };
     let stop = match options.schedule.unwrap_or(Schedule::Bulk) {
         Schedule::Exact => exact::run(&mut collapsers, &factors, &goal, control),
         Schedule::Bulk => {
             with_threads(options.threads, || bulk::run(&mut collapsers, &factors, &goal, control))
         }
     };
+    if stop != Stop::Cancelled {
+        with_threads(options.threads, || {
+            for (c, original) in collapsers.iter_mut().zip(&originals) {
+                refit::run(c, original, sweeps, options, control);
+            }
+        });
+    }
     let mut found = Vec::with_capacity(collapsers.len());
     for mut c in collapsers {
         c.work.write_back();

@@ -12,9 +12,9 @@ pub(crate) struct WedgeMerge {
 }
 
 /// A face on the edge: its wedges at the kept vertex, the removed vertex and the tip, and weights that give the new place.
-struct Side {
-    wedges: [u32; 3],
-    weights: [f64; 3],
+pub(crate) struct Side {
+    pub(crate) wedges: [u32; 3],
+    pub(crate) weights: [f64; 3],
 }
 
 impl WedgeMerge {
@@ -69,6 +69,17 @@ impl WedgeMerge {
             }
         }
         *work.mesh.wedges_mut() = Some(wedges);
+    }
+
+    /// Whether there are wedges at all.
+    pub(crate) fn active(&self) -> bool {
+        self.active
+    }
+
+    /// The row at the place that `side` gives; its first wedge must be one.
+    pub(crate) fn blend(&mut self, wedges: &Wedges, side: &Side) -> &mut [f32] {
+        self.interpolate(wedges, side);
+        &mut self.row
     }
 
     /// The row at the new place, into `self.row`.

@@ -44,6 +44,8 @@ pub(crate) struct Work<'m> {
     pub(crate) moved: Bits,
     /// Triangles left (a polygon of n corners counts n - 2).
     pub(crate) triangles: usize,
+    /// The vertex that each was collapsed into, itself while it lives; empty unless a refit will ask.
+    pub(crate) into: Vec<u32>,
 }
 
 impl<'m> Work<'m> {
@@ -71,6 +73,7 @@ impl<'m> Work<'m> {
             seams,
             moved: Bits::new(slots),
             triangles,
+            into: Vec::new(),
             mesh,
         };
         work.kinds = work.classify(options);

@@ -1,0 +1,293 @@
+//! Samples of the original, and the places of the result they are bound to.
+
+use super::net::Net;
+use super::original::{Curve, Original};
+use super::solve::Moments;
+use crate::measure::triangle::closest;
+use crate::parallel::{map_chunks, map_init};
+use crate::work::Work;
+use glam::DVec3;
+use progmesh_aif::NONE;
+
+/// Samples for each triangle of the result. On bunny, horse and fandisk 6 gain half of what 16 do, 32 little more.
+const PER_TRIANGLE: f64 = 16.0;
+/// Fewest samples of a mesh.
+const FEWEST: f64 = 64.0;
+/// Samples for each edge of a border or seam of the original.
+const PER_CURVE: usize = 4;
+/// What the samples of a border weigh for each squared length of its edges, as its planes do in the collapses.
+const BORDER_WEIGHT: f64 = 3.0;
+/// The same for seams.
+const SEAM_WEIGHT: f64 = 1.0;
+/// Triangles that are sampled at a time by one thread.
+const CHUNK: usize = 2048;
+/// Chunks that are under way together, to bound memory.
+const BATCH: usize = 64;
+/// Most steps of a search from face to face, or along a curve.
+const STEPS: usize = 8;
+
+/// A sample and what it is bound to.
+pub(super) struct Hit {
+    pub(super) face: u32,
+    /// Weights of the second and third corner of the place.
+    pub(super) v: f64,
+    pub(super) w: f64,
+    /// From the place to the sample.
+    pub(super) r: DVec3,
+    pub(super) weight: f64,
+}
+
+/// A sample of a curve and what it is bound to.
+pub(super) struct CurveHit {
+    pub(super) curve: u32,
+    /// Weight of the curve's second end.
+    pub(super) s: f64,
+    pub(super) r: DVec3,
+    pub(super) weight: f64,
+}
+
+/// How near the samples are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fit {
+    /// Weighted squared distances of the samples of the surface, summed up.
+    surface: f64,
+    /// Of the curves.
+    curves: f64,
+}
+
+impl Fit {
+    /// Nearer in all, and the surface by itself not farther.
+    pub(super) fn is_better_than(&self, o: &Fit) -> bool {
+        self.surface + self.curves < o.surface + o.curves && self.surface <= o.surface
+    }
+}
+
+/// A run of triangles of the original and the samples on it, which are the `first`, `first + 1`, ... of all.
+struct Chunk {
+    triangles: std::ops::Range<usize>,
+    /// Area of all triangles before.
+    area: f64,
+    first: usize,
+    end: usize,
+    /// The face each was last bound to.
+    faces: Vec<u32>,
+}
+
+/// All samples. Only where they were bound last is kept; the rest is found again when it is needed.
+pub(super) struct Samples<'a> {
+    original: &'a Original,
+    /// The vertex of the result that each vertex of the original went into.
+    roots: Vec<u32>,
+    weights: &'a [f32],
+    chunks: Vec<Chunk>,
+    /// Area that a sample stands for.
+    step: f64,
+    /// The curves that samples of each curve of the original were last bound to.
+    curves: Vec<[u32; PER_CURVE]>,
+}
+
+impl<'a> Samples<'a> {
+    /// Distributes the samples; `None` if the original has no area. O(n).
+    pub(super) fn new(
+        work: &Work<'_>,
+        original: &'a Original,
+        roots: Vec<u32>,
+        weights: &'a [f32],
+    ) -> Option<Self> {
+        let all = &original.triangles;
+        let count = all.len().div_ceil(CHUNK);
+        let range = |i: usize| i * CHUNK..((i + 1) * CHUNK).min(all.len());
+        let areas = map_init(count, || (), |(), i| all[range(i)].iter().map(|t| area(work, t)).sum::<f64>());
+        let total: f64 = areas.iter().sum();
+        let n = (PER_TRIANGLE * work.triangles as f64).max(FEWEST);
+        let step = total / n;
+        if !(step > 0.0 && step.is_finite()) {
+            return None;
+        }
+        // Sample k lies at area (k + 1/2) step.
+        let at = |area: f64| ((area / step - 0.5).ceil().max(0.0) as usize).min(n as usize);
+        let mut before = 0.0;
+        let chunk = |(i, a): (usize, &f64)| {
+            let start = before;
+            before += a;
+            Chunk { triangles: range(i), area: start, first: at(start), end: at(before), faces: Vec::new() }
+        };
+        let chunks = areas.iter().enumerate().map(chunk).collect();
+        let curves = vec![[NONE; PER_CURVE]; original.curves.len()];
+        Some(Samples { original, roots, weights, chunks, step, curves })
+    }
+
+    /// Binds every sample to the result as it is now, and sums up what it asks of the vertices. O(samples).
+    pub(super) fn bind(&mut self, work: &Work<'_>, net: &Net, moments: &mut Moments) -> Fit {
+        moments.clear(net);
+        let mut fit = Fit { surface: 0.0, curves: 0.0 };
+        let mut chunks = std::mem::take(&mut self.chunks);
+        for batch in chunks.chunks_mut(BATCH) {
+            for hits in map_chunks(batch, 1, |c| c.iter_mut().flat_map(|c| self.bind_chunk(work, net, c)).collect::<Vec<_>>()) {
+                for hit in &hits {
+                    fit.surface += hit.weight * hit.r.length_squared();
+                    moments.add(hit);
+                }
+            }
+        }
+        self.chunks = chunks;
+        let mut curves = std::mem::take(&mut self.curves);
+        for (curve, last) in self.original.curves.iter().zip(&mut curves) {
+            for (i, last) in last.iter_mut().enumerate() {
+                if let Some(hit) = self.bind_to_curve(work, net, curve, i, last) {
+                    fit.curves += hit.weight * hit.r.length_squared();
+                    moments.add_to_curve(&hit);
+                }
+            }
+        }
+        self.curves = curves;
+        fit
+    }
+
+    /// The samples of a chunk that find a face.
+    fn bind_chunk(&self, work: &Work<'_>, net: &Net, c: &mut Chunk) -> Vec<Hit> {
+        c.faces.resize(c.end - c.first, NONE);
+        let mut hits = Vec::with_capacity(c.faces.len());
+        let (mut k, mut upto) = (c.first, c.area);
+        for i in c.triangles.clone() {
+            let t = &self.original.triangles[i];
+            upto += area(work, t);
+            // Sums are rounded: the last triangle takes what is left over.
+            let last = i + 1 == c.triangles.end;
+            while k < c.end && (last || (k as f64 + 0.5) * self.step < upto) {
+                hits.extend(self.bind_one(work, net, t, k, &mut c.faces[k - c.first]));
+                k += 1;
+            }
+        }
+        hits
+    }
+
+    /// Sample `k`, on triangle `t`.
+    #[inline]
+    fn bind_one(&self, work: &Work<'_>, net: &Net, t: &[u32; 3], k: usize, face: &mut u32) -> Option<Hit> {
+        let weights = spread(k);
+        let [a, b, c] = t.map(|v| place(work, v));
+        let p = a * weights[0] + b * weights[1] + c * weights[2];
+        let mut best = f64::INFINITY;
+        let mut found = (*face, 0.0, 0.0);
+        let mut look = |g: u32, found: &mut (u32, f64, f64)| {
+            let foot = closest(net.corners(g), p);
+            if foot.d2 < best {
+                best = foot.d2;
+                *found = (g, foot.v, foot.w);
+            }
+        };
+        if *face == NONE {
+            // From the vertex that the nearest corner went into; from another's where that is a hub.
+            let mut order = [0, 1, 2];
+            order.sort_by(|&i: &usize, &j| weights[j].total_cmp(&weights[i]));
+            let root = order.iter().map(|&i| self.roots[t[i] as usize]).find(|&r| r != NONE)?;
+            net.around.of(root).iter().for_each(|&g| look(g, &mut found));
+        } else {
+            look(*face, &mut found);
+        }
+        for _ in 0..STEPS {
+            let from = found.0;
+            if from == NONE {
+                break;
+            }
+            net.beside.of(from).iter().for_each(|&g| look(g, &mut found));
+            if found.0 == from {
+                break;
+            }
+        }
+        if !best.is_finite() {
+            return None;
+        }
+        let (f, v, w) = found;
+        *face = f;
+        let [x, y, z] = net.corners(f);
+        let r = p - (x + (y - x) * v + (z - x) * w);
+        let weight = match self.weights {
+            [] => 1.0,
+            all => (0..3).map(|i| weights[i] * all[t[i] as usize] as f64).sum(),
+        };
+        Some(Hit { face: f, v, w, r, weight })
+    }
+
+    /// Sample `i` of a curve.
+    fn bind_to_curve(
+        &self,
+        work: &Work<'_>,
+        net: &Net,
+        curve: &Curve,
+        i: usize,
+        last: &mut u32,
+    ) -> Option<CurveHit> {
+        let [a, b] = curve.ends.map(|v| place(work, v));
+        let along = (i as f64 + 0.5) / PER_CURVE as f64;
+        let p = a.lerp(b, along);
+        let (mut best, mut found) = (f64::INFINITY, (*last, 0.0));
+        let mut todo = match *last {
+            NONE => {
+                let root = self.roots[curve.ends[(along > 0.5) as usize] as usize];
+                if root == NONE {
+                    return None;
+                }
+                [root; 2]
+            }
+            c => net.curves[c as usize].0,
+        };
+        for _ in 0..STEPS {
+            let from = found.0;
+            for &c in todo.iter().flat_map(|&v| net.curves_at.of(v)) {
+                let (ends, border) = net.curves[c as usize];
+                if border != curve.border {
+                    continue;
+                }
+                let [x, y] = ends.map(|v| net.points[v as usize]);
+                let side = y - x;
+                let length = side.length_squared();
+                let s = if length > 0.0 { ((p - x).dot(side) / length).clamp(0.0, 1.0) } else { 0.0 };
+                let d2 = (x + side * s).distance_squared(p);
+                if d2 < best {
+                    best = d2;
+                    found = (c, s);
+                }
+            }
+            if found.0 == from || found.0 == NONE {
+                break;
+            }
+            todo = net.curves[found.0 as usize].0;
+        }
+        if !best.is_finite() {
+            return None;
+        }
+        let (c, s) = found;
+        *last = c;
+        let [x, y] = net.curves[c as usize].0.map(|v| net.points[v as usize]);
+        let k = if curve.border { BORDER_WEIGHT } else { SEAM_WEIGHT };
+        let mean = match self.weights {
+            [] => 1.0,
+            all => curve.ends.iter().map(|&v| 0.5 * all[v as usize] as f64).sum(),
+        };
+        let weight = mean * k * a.distance_squared(b) / (PER_CURVE as f64 * self.step);
+        Some(CurveHit { curve: c, s, r: p - x.lerp(y, s), weight })
+    }
+}
+
+/// Where a vertex of the original was, local frame: the mesh keeps old places until the work is written back.
+#[inline]
+fn place(work: &Work<'_>, v: u32) -> DVec3 {
+    work.to_local(work.mesh.positions().get(v as usize))
+}
+
+#[inline]
+fn area(work: &Work<'_>, t: &[u32; 3]) -> f64 {
+    let [a, b, c] = t.map(|v| place(work, v));
+    0.5 * (b - a).cross(c - a).length()
+}
+
+/// Weights of the corners for sample `k`: consecutive ones fill a triangle evenly (the additive sequence of the plastic number, Roberts 2018).
+#[inline]
+fn spread(k: usize) -> [f64; 3] {
+    let k = k as f64 + 1.0;
+    let (u, v) = ((0.5 + k * 0.754_877_666_246_692_7).fract(), (0.5 + k * 0.569_840_290_998_053_3).fract());
+    let (x, y) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+    [1.0 - x - y, x, y]
+}
