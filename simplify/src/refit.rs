@@ -79,9 +79,10 @@ pub(crate) fn run(
             let within = bound == f64::INFINITY || q.at(to - start[v]) <= bound * q.weight;
             (to.is_finite() && within).then_some(to)
         };
-        let mut points = std::mem::take(&mut net.points);
+        let mut points = net.points.clone();
         solver.solve(&net, &moments, &mut points, place);
         net.points = points;
+        net.refresh();
     }
     attributes::follow(c, &net, &start);
     for (i, &v) in net.vertices.iter().enumerate() {

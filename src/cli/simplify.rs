@@ -245,7 +245,8 @@ impl Args {
         let fixed = self.keep_vertices || self.placement.is_some_and(|p| p != PlacementName::Optimal);
         if fixed && self.refit.is_some_and(|n| n > 0) {
             return Err(Failure::Usage(
-                "--refit moves vertices: it goes with --placement optimal only, not with --keep-vertices".into(),
+                "--refit moves vertices: it goes with --placement optimal only, not with --keep-vertices"
+                    .into(),
             ));
         }
         let target = self.ratio.is_some() || self.triangles.is_some() || self.max_error.is_some();

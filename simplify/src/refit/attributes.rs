@@ -68,14 +68,7 @@ fn on_face(work: &Work<'_>, wedges: &Wedges, net: &Net, start: &[DVec3], v: u32)
 }
 
 /// The place on the nearest seam edge at `v`, for the faces on both sides.
-fn along_seam(
-    work: &Work<'_>,
-    wedges: &Wedges,
-    net: &Net,
-    start: &[DVec3],
-    v: u32,
-    sides: &mut Vec<Side>,
-) {
+fn along_seam(work: &Work<'_>, wedges: &Wedges, net: &Net, start: &[DVec3], v: u32, sides: &mut Vec<Side>) {
     let (to, from) = (net.points[v as usize], start[v as usize]);
     let mut best = f64::INFINITY;
     let mut found = None;

@@ -18,6 +18,10 @@ pub(super) struct Net {
     pub(super) points: Vec<DVec3>,
     pub(super) faces: Vec<FaceId>,
     pub(super) triangles: Vec<[u32; 3]>,
+    /// What spares looking at a face, as [`Net::refresh`] found it last.
+    pub(super) cells: Vec<Cell>,
+    /// The least height of each face.
+    pub(super) heights: Vec<f64>,
     /// Faces at each vertex.
     pub(super) around: Lists,
     /// Faces that share a vertex with each face, hubs left out.
@@ -28,6 +32,34 @@ pub(super) struct Net {
     pub(super) curves_at: Lists,
     /// Number of each vertex slot.
     number: Vec<u32>,
+}
+
+/// A ball and a plane that hold a face. One cache line.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub(super) struct Cell {
+    centre: DVec3,
+    radius: f64,
+    /// Unit normal; zero if the face has none.
+    pub(super) normal: DVec3,
+    offset: f64,
+}
+
+impl Cell {
+    fn of([a, b, c]: [DVec3; 3]) -> Self {
+        let centre = (a + b + c) / 3.0;
+        let far = |p: DVec3| p.distance_squared(centre);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        Cell { centre, radius: far(a).max(far(b)).max(far(c)).sqrt(), normal, offset: normal.dot(a) }
+    }
+
+    /// Whether the face may be nearer to `p` than `distance`, whose square is `d2`.
+    #[inline]
+    pub(super) fn may_be_nearer(&self, p: DVec3, distance: f64, d2: f64) -> bool {
+        let reach = self.radius + distance;
+        let height = self.normal.dot(p) - self.offset;
+        self.centre.distance_squared(p) < reach * reach && height * height < d2
+    }
 }
 
 /// Lists of numbers, one for each of a row of things.
@@ -87,7 +119,9 @@ impl Net {
                 *kind = Kind::Pinned;
             }
         }
-        Net {
+        let mut net = Net {
+            cells: Vec::new(),
+            heights: Vec::new(),
             points: vertices.iter().map(|v| work.points[v.index()]).collect(),
             beside: beside(&triangles, &around),
             kinds,
@@ -98,7 +132,25 @@ impl Net {
             curves,
             curves_at,
             number,
-        }
+        };
+        net.refresh();
+        net
+    }
+
+    /// To be called when points have changed. O(faces).
+    pub(super) fn refresh(&mut self) {
+        let mut cells = std::mem::take(&mut self.cells);
+        cells.clear();
+        cells.extend((0..self.triangles.len()).map(|f| Cell::of(self.corners(f as u32))));
+        self.cells = cells;
+        let mut heights = std::mem::take(&mut self.heights);
+        heights.clear();
+        heights.extend((0..self.triangles.len()).map(|f| {
+            let [a, b, c] = self.corners(f as u32);
+            let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
+            if longest > 0.0 { (b - a).cross(c - a).length() / longest } else { 0.0 }
+        }));
+        self.heights = heights;
     }
 
     /// From the vertex that each was collapsed into, the number of the one it ended in, by slot; [`NONE`] for one that is not left, or a

@@ -63,8 +63,8 @@ impl Moments {
     /// No samples, on the faces as they lie now.
     pub(super) fn clear(&mut self, net: &Net) {
         self.curves.fill(CurveMoments::default());
-        for (f, m) in self.faces.iter_mut().enumerate() {
-            *m = FaceMoments { normal: normal(net.corners(f as u32)).normalize_or_zero(), ..Default::default() };
+        for (m, cell) in self.faces.iter_mut().zip(&net.cells) {
+            *m = FaceMoments { normal: cell.normal, ..Default::default() };
         }
     }
 
