@@ -34,6 +34,27 @@ fn topology_is_kept() {
 }
 
 #[test]
+fn a_refit_moves_vertices_where_it_may() {
+    let p = Place::new();
+    p.generate("torus", "in.obj", 2000);
+    let result = |how: &str| {
+        p.simplify(&format!("in.obj out.obj --ratio 0.2 {how}"));
+        p.read("out.obj")
+    };
+    let plain = result("--refit 0");
+    assert!(result("") == result("--refit 2"), "the default on small inputs");
+    assert!(result("--refit 2") != plain);
+    assert!(result("--refit 0 --keep-vertices") == result("--keep-vertices"));
+    for (how, why) in [
+        ("--refit 1 --method nsa", "--refit is for --method quadric"),
+        ("--refit 1 --keep-vertices", "--placement optimal only"),
+        ("--refit 1 --placement midpoint", "--placement optimal only"),
+    ] {
+        p.run(&format!("simplify in.obj out.obj --ratio 0.5 {how}")).failed(2, why);
+    }
+}
+
+#[test]
 fn an_error_bound_stops_the_work_and_is_done() {
     let p = Place::new();
     p.generate("sphere", "in.obj", 1280);

@@ -12,6 +12,7 @@ fn the_output_does_not_depend_on_the_number_of_threads() {
     for (file, how) in [
         ("scan.obj", "--ratio 0.2 --schedule bulk"),
         ("scan.obj", "--ratio 0.2 --schedule exact"),
+        ("scan.obj", "--ratio 0.5 --refit 3"),
         ("scan.obj", "--method nsa --passes 3"),
         ("scan.obj", "--method cluster --ratio 0.2"),
         ("sphere.obj", "--ratio 0.3 --normals recompute"),

@@ -138,7 +138,7 @@ proptest! {
         let input = sample(name, faces, seed);
         let triangles = input.clone().triangulate().unwrap().mesh;
         let mut m = input;
-        let out = run(&mut m, |o| (o.schedule, o.placement, o.ratio) = (Some(schedule), Some(placement), Some(0.9)));
+        let out = run(&mut m, |o| (o.schedule, o.placement, o.ratio, o.refit) = (Some(schedule), Some(placement), Some(0.9), Some(0)));
         // A vertex that took part in no collapse as the one that stays is where it was; at most one moves for each collapse.
         let before = places(&triangles);
         let moved = m.topology().vertices().filter(|v| !before.contains(&m.positions().bits(v.index()))).count() as u64;

@@ -18,7 +18,8 @@ const WAYS: [(Schedule, Placement); 4] = [
 
 fn run(m: &mut Mesh, way: (Schedule, Placement), set: impl FnOnce(&mut Options)) -> Outcome {
     let mut o = Options::default();
-    (o.schedule, o.placement) = (Some(way.0), Some(way.1));
+    // Where vertices may move at all, they are refitted too.
+    (o.schedule, o.placement, o.refit) = (Some(way.0), Some(way.1), Some(2));
     set(&mut o);
     let out = simplify(m, &o, &Quiet).unwrap();
     assert_eq!(m.check(), Ok(()));

@@ -316,3 +316,67 @@ fn spread(k: usize) -> [f64; 3] {
     let (x, y) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
     [1.0 - x - y, x, y]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::Options;
+    use progmesh_aif::Mesh;
+    use progmesh_meshes::{GenerateOptions, generate};
+
+    fn ball() -> Mesh {
+        let s = generate("sphere", &GenerateOptions::default().with_faces(500)).unwrap();
+        let triangles: Vec<[u32; 3]> = s.corners.chunks(3).map(|c| [c[0], c[1], c[2]]).collect();
+        let points: Vec<[f32; 3]> = s.positions.iter().map(|p| p.map(|x| x as f32)).collect();
+        Mesh::from_triangles(points, &triangles).unwrap()
+    }
+
+    /// All samples of the ball, bound to the ball with its points changed.
+    fn bound(change: impl Fn(usize, DVec3) -> DVec3) -> (Net, Vec<Hit>, f64) {
+        let mut mesh = ball();
+        let mut work = Work::new(&mut mesh, &Options::default()).unwrap();
+        let original = Original::of(&mut work);
+        let mut net = Net::new(&work);
+        net.points.iter_mut().enumerate().for_each(|(i, p)| *p = change(i, *p));
+        net.refresh();
+        let roots = net.roots(std::mem::take(&mut work.into));
+        let samples = Samples::new(&work, &original, roots, &[]).unwrap();
+        let mut chunks = samples.chunks.iter().map(|c| Chunk {
+            triangles: c.triangles.clone(),
+            area: c.area,
+            first: c.first,
+            end: c.end,
+            faces: Vec::new(),
+        });
+        let hits = chunks.by_ref().flat_map(|mut c| samples.bind_chunk(&work, &net, &mut c)).collect();
+        (net, hits, PER_TRIANGLE * work.triangles as f64)
+    }
+
+    #[test]
+    fn samples_of_a_surface_lie_on_it_evenly() {
+        let (net, hits, count) = bound(|_, p| p);
+        assert_eq!(hits.len() as f64, count);
+        assert!(hits.iter().all(|h| h.r.length() < 1e-12 && h.weight == 1.0));
+        let mut of_face = vec![0; net.triangles.len()];
+        hits.iter().for_each(|h| of_face[h.face as usize] += 1);
+        assert!(of_face.iter().all(|n| (4..40).contains(n)), "{of_face:?}");
+    }
+
+    #[test]
+    fn a_sample_is_bound_to_the_nearest_face_of_all() {
+        let (net, hits, _) = bound(|i, p| {
+            let wobble = DVec3::new((i * 7 % 5) as f64, (i * 11 % 7) as f64, (i * 13 % 3) as f64);
+            p + (wobble - 2.0) * 0.004
+        });
+        let mut wrong = 0;
+        for h in &hits {
+            let [a, b, c] = net.corners(h.face);
+            let p = a + (b - a) * h.v + (c - a) * h.w + h.r;
+            let least = (0..net.triangles.len() as u32).map(|f| closest(net.corners(f), p).d2);
+            let least = least.fold(f64::INFINITY, f64::min).sqrt();
+            assert!(h.r.length() >= least - 1e-12);
+            wrong += (h.r.length() > least + 1e-12) as usize;
+        }
+        assert!(wrong * 100 <= hits.len(), "{wrong} of {}", hits.len());
+    }
+}

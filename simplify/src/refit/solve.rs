@@ -194,3 +194,43 @@ impl Solver {
 fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::original::Original;
+    use super::super::samples::Samples;
+    use super::*;
+    use crate::options::Options;
+    use crate::work::Work;
+    use progmesh_aif::Mesh;
+
+    /// A flat square of 5 x 5 vertices, its middle lifted by `lift` after the samples were taken; where the middle goes in a sweep.
+    fn middle_after(lift: f64, place: impl Fn(usize, DVec3) -> Option<DVec3>) -> f64 {
+        let points: Vec<[f32; 3]> = (0..25).map(|i| [(i % 5) as f32, (i / 5) as f32, 0.0]).collect();
+        let quad = |i: u32| [[i, i + 1, i + 6], [i, i + 6, i + 5]];
+        let triangles: Vec<_> = (0..20).filter(|i| i % 5 < 4).flat_map(quad).collect();
+        let mut mesh = Mesh::from_triangles(points, &triangles).unwrap();
+        let mut work = Work::new(&mut mesh, &Options::default()).unwrap();
+        let original = Original::of(&mut work);
+        let mut net = Net::new(&work);
+        net.points[12].z = lift;
+        net.refresh();
+        let roots = net.roots(std::mem::take(&mut work.into));
+        let mut moments = Moments::new(&net);
+        Samples::new(&work, &original, roots, &[]).unwrap().bind(&work, &net, &mut moments);
+        let mut moved = net.points.clone();
+        Solver::new(&net).solve(&net, &moments, &mut moved, place);
+        moved[12].z
+    }
+
+    #[test]
+    fn a_vertex_off_the_surface_goes_back() {
+        let after = middle_after(0.05, |_, p| Some(p));
+        assert!(after.abs() < 0.01, "{after}");
+    }
+
+    #[test]
+    fn a_place_that_is_forbidden_is_not_taken() {
+        assert_eq!(middle_after(0.05, |_, _| None), 0.05);
+    }
+}
