@@ -28,8 +28,8 @@ use solve::{Moments, Solver};
 
 /// The most triangles of an input (all meshes together) whose result is refitted without being asked.
 ///
-/// Of this size it costs some ten milliseconds. Decided on fandisk, of 12,946 triangles: two sweeps make 15 ms of processor time 87 at a half, and
-/// 22 ms 44 at a tenth; on pirate, of 5,010, they bring silhouettes at a fifth from 0.981 to 0.982.
+/// Of this size it costs some ten milliseconds. Decided on fandisk, of 12,946 triangles: two sweeps make 7 ms of processor time 87 at a half, and
+/// 10 ms 26 at a tenth; on pirate, of 5,010, they bring silhouettes at a fifth from 0.981 to 0.982.
 pub const REFIT_LIMIT: usize = 8192;
 /// Sweeps then. The first takes 6 to 14 % off the rms (bunny, horse, fandisk and rangemap at 50, 10 and 1 %), the second up to 3.
 const DEFAULT_SWEEPS: usize = 2;
