@@ -8,6 +8,7 @@ pub use progmesh_aif as aif;
 pub use progmesh_meshes as meshes;
 pub use progmesh_refine as refine;
 pub use progmesh_simplify as simplify;
+pub use progmesh_terrain as terrain;
 
 pub mod compare;
 pub mod io;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const LIBRARIES: [&str; 4] = ["aif", "simplify", "refine", "meshes"];
+const LIBRARIES: [&str; 5] = ["aif", "simplify", "refine", "terrain", "meshes"];
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
