@@ -9,7 +9,8 @@
 //! one collapse takes time in proportion to the valence, and memory is one flat record of about 100 bytes a collapse.
 //!
 //! There now: the multiresolution scheme in memory, [progressive meshes](progressive), their [files and
-//! streams](mod@format), and [geomorphs](geomorph). Not there yet: view-dependent refinement; it will build on the same records.
+//! streams](mod@format), [geomorphs](geomorph), and [views](view): cameras, their planes, what they cannot see. Not there yet:
+//! view-dependent refinement; it will build on the same records.
 //!
 //! ```
 //! use progmesh_refine::{History, simplify::{Options, Quiet}};
@@ -26,6 +27,7 @@ pub mod format;
 pub mod geomorph;
 pub mod progressive;
 mod record;
+pub mod view;
 
 pub use geomorph::{Geomorph, GeomorphError};
 pub use progmesh_aif as aif;
