@@ -3,6 +3,7 @@
 //! A decoder takes the bytes of a file and a [`Side`] that finds the files it names (MTL, textures, buffers). An
 //! encoder returns bytes. What a format cannot hold, or what was changed on the way in, is a warning, never silent.
 
+pub mod camera;
 #[cfg(feature = "files")]
 pub mod files;
 pub(crate) mod flatten;
