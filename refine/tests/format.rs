@@ -1,5 +1,8 @@
 //! The `.pm` file: exact round trips, streaming, random access, damage.
 
+mod common;
+
+use common::{NAMES, assert_same, input_of, options, sample};
 use progmesh_meshes::{GenerateOptions, Sample, generate};
 use progmesh_refine::ProgressiveMesh;
 use progmesh_refine::aif::*;
@@ -9,83 +12,26 @@ use progmesh_refine::simplify::{Method, Options, Placement, Quiet};
 use proptest::prelude::*;
 use std::io::Read;
 
-/// The sample with normals and uvs as wedges, and groups.
+/// The sample, in single precision or in places that need double.
 fn mesh_of(s: &Sample, double: bool) -> Mesh {
-    let positions = if double {
+    let mut input = input_of(s);
+    if double {
         let shifted = s.positions.iter().map(|p| p.map(|x| x * 1.1 + 1e-9));
-        Positions::F64(shifted.collect())
-    } else {
-        Positions::from_f64(s.positions.clone())
-    };
-    let mut input = MeshInput {
-        positions,
-        face_sizes: s.face_sizes.clone(),
-        corners: s.corners.clone(),
-        wires: s.wires.clone(),
-        face_material: s.face_material.clone(),
-        ..Default::default()
-    };
-    if let Some(n) = &s.normals {
-        let mut channels = vec![Channel::new(Semantic::Normal, 3)];
-        s.uvs.iter().for_each(|_| channels.push(Channel::new(Semantic::TexCoord(0), 2)));
-        let all = (1 << channels.len()) - 1;
-        let mut w = Wedges::new(channels).unwrap();
-        let mut known = std::collections::HashMap::new();
-        for c in 0..s.corners.len() {
-            let uv = s.uvs.as_ref().map(|u| u.corner[c]);
-            let id = *known.entry((n.corner[c], uv)).or_insert_with(|| {
-                let mut row = n.values[n.corner[c] as usize].to_vec();
-                s.uvs.iter().for_each(|u| row.extend(u.values[u.corner[c] as usize]));
-                w.push(&row, all)
-            });
-            w.corner.push(id);
-        }
-        input.wedges = Some(w);
+        input.positions = Positions::F64(shifted.collect());
     }
     Mesh::build(input, &BuildOptions::default()).unwrap().0
 }
 
-fn sample(name: &str, faces: usize, seed: u64) -> Mesh {
-    let s = generate(name, &GenerateOptions::default().with_faces(faces).with_seed(seed)).unwrap();
-    mesh_of(&s, false)
-}
-
-const NAMES: [&str; 8] =
-    ["sphere", "torus", "scan", "terrain", "polygons", "quad-sphere", "cad", "nonmanifold"];
-
 fn runs() -> Vec<Options> {
-    let one = |method, placement| {
-        let mut o = Options::default();
-        (o.method, o.placement) = (method, placement);
-        o
-    };
     let mut all = vec![
-        one(Method::Quadric, Some(Placement::Endpoint)),
-        one(Method::Quadric, None),
-        one(Method::Quadric, Some(Placement::Midpoint)),
-        one(Method::Nsa, None),
-        one(Method::Nsa, Some(Placement::Endpoint)),
+        options(Method::Quadric, Some(Placement::Endpoint)),
+        options(Method::Quadric, None),
+        options(Method::Quadric, Some(Placement::Midpoint)),
+        options(Method::Nsa, None),
+        options(Method::Nsa, Some(Placement::Endpoint)),
     ];
     all[1].grid = Some((-14f64).exp2());
     all
-}
-
-fn assert_same(a: &MeshInput, b: &MeshInput) {
-    assert!(same_positions(&a.positions, &b.positions), "positions");
-    assert_eq!(a.face_sizes, b.face_sizes);
-    assert_eq!(a.corners, b.corners);
-    assert_eq!(a.wires, b.wires);
-    assert_eq!(a.face_material, b.face_material);
-    assert_eq!(a.face_group, b.face_group);
-    assert_eq!(a.wedges.is_some(), b.wedges.is_some());
-    let bits = |w: &Wedges| -> Vec<(u64, Vec<u32>)> {
-        (0..w.len() as u32).map(|i| (w.present(i), w.row(i).iter().map(|x| x.to_bits()).collect())).collect()
-    };
-    if let (Some(x), Some(y)) = (&a.wedges, &b.wedges) {
-        assert_eq!(x.channels(), y.channels());
-        assert_eq!(x.corner, y.corner);
-        assert_eq!(bits(x), bits(y));
-    }
 }
 
 /// The base of both is the same, bit for bit.

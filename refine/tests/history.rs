@@ -1,6 +1,8 @@
 //! Levels up and down: every state is what it was, however it is reached.
 
-use progmesh_meshes::{GenerateOptions, Sample, generate};
+mod common;
+
+use common::{NAMES, sample};
 use progmesh_refine::History;
 use progmesh_refine::aif::*;
 use progmesh_refine::simplify::{Control, Method, Options, Placement, Quiet, SimplifyError, Stop, simplify};
@@ -20,43 +22,6 @@ fn everything(m: &Mesh) -> String {
         .collect();
     format!("{stars:?} {edges:?} {faces:?} {corners:?}")
 }
-
-/// The sample with normals and uvs as wedges, one for each pair of values: shared across seams, so that NSA must part them.
-fn mesh_of(s: &Sample) -> Mesh {
-    let mut input = MeshInput {
-        positions: Positions::from_f64(s.positions.clone()),
-        face_sizes: s.face_sizes.clone(),
-        corners: s.corners.clone(),
-        wires: s.wires.clone(),
-        face_material: s.face_material.clone(),
-        ..Default::default()
-    };
-    if let Some(n) = &s.normals {
-        let mut channels = vec![Channel::new(Semantic::Normal, 3)];
-        s.uvs.iter().for_each(|_| channels.push(Channel::new(Semantic::TexCoord(0), 2)));
-        let all = (1 << channels.len()) - 1;
-        let mut w = Wedges::new(channels).unwrap();
-        let mut known = std::collections::HashMap::new();
-        for c in 0..s.corners.len() {
-            let uv = s.uvs.as_ref().map(|u| u.corner[c]);
-            let id = *known.entry((n.corner[c], uv)).or_insert_with(|| {
-                let mut row = n.values[n.corner[c] as usize].to_vec();
-                s.uvs.iter().for_each(|u| row.extend(u.values[u.corner[c] as usize]));
-                w.push(&row, all)
-            });
-            w.corner.push(id);
-        }
-        input.wedges = Some(w);
-    }
-    Mesh::build(input, &BuildOptions::default()).unwrap().0
-}
-
-fn sample(name: &str, faces: usize, seed: u64) -> Mesh {
-    mesh_of(&generate(name, &GenerateOptions::default().with_faces(faces).with_seed(seed)).unwrap())
-}
-
-const NAMES: [&str; 8] =
-    ["sphere", "torus", "scan", "terrain", "polygons", "quad-sphere", "cad", "nonmanifold"];
 
 fn any_mesh() -> impl Strategy<Value = (&'static str, Mesh)> {
     (prop::sample::select(NAMES.to_vec()), 20usize..400, 0u64..1000)

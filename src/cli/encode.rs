@@ -71,7 +71,7 @@ impl Args {
         let file = self.input.name();
         let mut warnings = Warnings::new(self.quiet);
         let interrupt = Interrupt::watch();
-        let report = common::in_pool(self.making.threads, || {
+        let report = common::in_pool(self.making.collapsing.threads, || {
             let scene = self.input.read(&mut warnings)?.decoded.scene;
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();

@@ -93,7 +93,7 @@ impl Args {
         let mut drawing = self.picture.drawing()?;
         let file = self.input.name();
         let interrupt = Interrupt::watch();
-        let report = common::in_pool(self.making.threads, || {
+        let report = common::in_pool(self.making.collapsing.threads, || {
             let read = self.input.read_or_make(&mut warnings, |scene, warnings| {
                 interrupt.be_graceful();
                 let progress = Progress::new(&interrupt, self.quiet, "simplifying");

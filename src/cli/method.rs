@@ -1,8 +1,9 @@
-//! Flags of the commands that make progressive meshes.
+//! Flags of the commands that collapse edges: `simplify`, and those that make progressive meshes.
 
 use super::Failure;
 use super::args::{self, Shape};
 use clap::ValueEnum;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use progmesh::pipeline::Job;
 use progmesh::simplify::{Method, Placement, Schedule};
 
@@ -10,11 +11,20 @@ use progmesh::simplify::{Method, Placement, Schedule};
 #[derive(clap::Args, Debug)]
 pub(crate) struct Making {
     /// How to simplify to the base
-    #[arg(long, value_enum, default_value_t = MethodName::Quadric, help_heading = "Method")]
+    #[arg(long, value_parser = recorded(), default_value = "quadric", help_heading = "Method")]
     method: MethodName,
-    /// Where a vertex goes that replaces an edge; endpoint gives the smallest files [default: midpoint for nsa, optimal otherwise]
+    #[command(flatten)]
+    pub(crate) collapsing: Collapsing,
+}
+
+/// How edges are collapsed.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Collapsing {
+    /// Where a vertex goes that replaces an edge (or a cluster) [default: midpoint for nsa, optimal otherwise]
+    ///
+    /// Progressive meshes are smallest with endpoint.
     #[arg(long, value_enum, help_heading = "Method")]
-    placement: Option<PlacementName>,
+    pub(crate) placement: Option<PlacementName>,
     /// quadric: always the cheapest edge, or batches of cheap ones [default: bulk]
     #[arg(long, value_enum, help_heading = "Method")]
     schedule: Option<ScheduleName>,
@@ -27,8 +37,8 @@ pub(crate) struct Making {
           help_heading = "Method")]
     passes: Option<usize>,
     /// Vertices on a border neither move nor go
-    #[arg(long, help_heading = "Method")]
-    lock_border: bool,
+    #[arg(long, help_heading = "What stays")]
+    pub(crate) lock_border: bool,
     #[command(flatten)]
     shape: Shape,
     /// Threads to use; the result does not depend on it [default: all]
@@ -37,15 +47,17 @@ pub(crate) struct Making {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum MethodName {
+pub(crate) enum MethodName {
     /// Edge collapse while no face's normal turns by more than --epsilon (Silva & Gomes)
     Nsa,
     /// Quadric edge collapse (Garland & Heckbert)
     Quadric,
+    /// Vertex clustering on a grid: fastest, coarsest, does not keep topology
+    Cluster,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum PlacementName {
+pub(crate) enum PlacementName {
     Endpoint,
     Midpoint,
     Optimal,
@@ -57,28 +69,56 @@ enum ScheduleName {
     Bulk,
 }
 
-impl Making {
-    /// As the report calls it.
-    pub(crate) fn method(&self) -> &'static str {
-        match self.method {
+/// The methods that are sequences of collapses, which a progressive mesh needs.
+fn recorded() -> impl TypedValueParser<Value = MethodName> {
+    let methods = MethodName::value_variants().iter().filter(|m| **m != MethodName::Cluster);
+    PossibleValuesParser::new(methods.filter_map(ValueEnum::to_possible_value))
+        .try_map(|name| MethodName::from_str(&name, false))
+}
+
+impl MethodName {
+    /// As reports call it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
             MethodName::Nsa => "nsa",
             MethodName::Quadric => "quadric",
+            MethodName::Cluster => "cluster",
         }
     }
 
-    pub(crate) fn job(&self) -> Result<Job, Failure> {
-        let nsa = self.method == MethodName::Nsa;
-        let misplaced = [
-            ("--epsilon", self.epsilon.is_some() && !nsa, "nsa"),
-            ("--passes", self.passes.is_some() && !nsa, "nsa"),
-            ("--schedule", self.schedule.is_some() && nsa, "quadric"),
-        ];
-        if let Some((flag, _, of)) = misplaced.iter().find(|m| m.1) {
-            return Err(Failure::Usage(format!("{flag} is for --method {of}")));
+    /// Refuses a flag that was given and is for another method.
+    pub(crate) fn allow(self, flag: &str, given: bool, of: MethodName) -> Result<(), Failure> {
+        match given && self != of {
+            true => Err(Failure::Usage(format!("{flag} is for --method {}", of.name()))),
+            false => Ok(()),
         }
+    }
+}
+
+impl Making {
+    /// As the report calls it.
+    pub(crate) fn method(&self) -> &'static str {
+        self.method.name()
+    }
+
+    pub(crate) fn job(&self) -> Result<Job, Failure> {
+        self.collapsing.job(self.method)
+    }
+}
+
+impl Collapsing {
+    /// A job by this method, without target.
+    pub(crate) fn job(&self, method: MethodName) -> Result<Job, Failure> {
+        method.allow("--epsilon", self.epsilon.is_some(), MethodName::Nsa)?;
+        method.allow("--passes", self.passes.is_some(), MethodName::Nsa)?;
+        method.allow("--schedule", self.schedule.is_some(), MethodName::Quadric)?;
         let mut job = Job::default();
         let o = &mut job.options;
-        o.method = if nsa { Method::Nsa } else { Method::Quadric };
+        o.method = match method {
+            MethodName::Nsa => Method::Nsa,
+            MethodName::Quadric => Method::Quadric,
+            MethodName::Cluster => Method::Cluster,
+        };
         o.placement = self.placement.map(|p| match p {
             PlacementName::Endpoint => Placement::Endpoint,
             PlacementName::Midpoint => Placement::Midpoint,

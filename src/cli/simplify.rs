@@ -1,13 +1,13 @@
 //! `progmesh simplify IN OUT`.
 
 use super::Failure;
-use super::args::{self, Input, Output, Shape};
+use super::args::{self, Input, Output};
 use super::common::{self, Warnings, thousands};
 use super::control::{Interrupt, Progress};
+use super::method::{Collapsing, MethodName, PlacementName};
 use super::picture::PictureArgs;
-use clap::ValueEnum;
 use progmesh::pipeline::{Job, JobError, count, simplify_scene};
-use progmesh::simplify::{self as engine, MaxError, SimplifyError, Stop};
+use progmesh::simplify::{MaxError, SimplifyError, Stop};
 use report::{Seconds, Triangles};
 use std::time::Instant;
 
@@ -40,12 +40,8 @@ pub(crate) struct Args {
     /// How to simplify
     #[arg(long, value_enum, default_value_t = MethodName::Quadric, help_heading = "Method")]
     method: MethodName,
-    /// Where a vertex goes that replaces an edge (or a cluster) [default: midpoint for nsa, optimal otherwise]
-    #[arg(long, value_enum, help_heading = "Method")]
-    placement: Option<PlacementName>,
-    /// quadric: always the cheapest edge, or batches of cheap ones [default: bulk]
-    #[arg(long, value_enum, help_heading = "Method")]
-    schedule: Option<ScheduleName>,
+    #[command(flatten)]
+    collapsing: Collapsing,
     /// quadric: afterwards, move vertices closer to the input in N sweeps [default: 2 for inputs of up to 8,192 triangles, else 0]
     ///
     /// The time goes with the size of the result: at a tenth of the input two sweeps take about as long as the collapses, at a half several
@@ -53,14 +49,6 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = args::whole, allow_negative_numbers = true,
           help_heading = "Method")]
     refit: Option<usize>,
-    /// nsa: the most a face's normal may turn in one collapse, degrees [default: 12]
-    #[arg(long, value_name = "DEG", value_parser = args::degrees, allow_negative_numbers = true,
-          help_heading = "Method")]
-    epsilon: Option<f64>,
-    /// nsa: at most this many passes
-    #[arg(long, value_name = "K", value_parser = args::positive, allow_negative_numbers = true,
-          help_heading = "Method")]
-    passes: Option<usize>,
 
     /// Stop at this part of the input's triangles, 0 to 1
     #[arg(long, value_name = "R", value_parser = args::fraction, conflicts_with = "triangles",
@@ -92,9 +80,6 @@ pub(crate) struct Args {
     #[arg(long, conflicts_with = "triangles", help_heading = "Target")]
     per_mesh: bool,
 
-    /// Vertices on a border neither move nor go
-    #[arg(long, help_heading = "What stays")]
-    lock_border: bool,
     /// Faces of this material stay; may be repeated
     #[arg(long, value_name = "NAME|INDEX", help_heading = "What stays")]
     lock_material: Vec<String>,
@@ -116,41 +101,13 @@ pub(crate) struct Args {
     prune: Option<f64>,
 
     #[command(flatten)]
-    shape: Shape,
-    #[command(flatten)]
     picture: PictureArgs,
-    /// Threads to use; the result does not depend on it [default: all]
-    #[arg(long, value_name = "N", value_parser = args::threads, allow_negative_numbers = true)]
-    threads: Option<usize>,
     /// Print one JSON object about the run on standard output (see docs/json.md)
     #[arg(long)]
     json: bool,
     /// Say nothing but errors
     #[arg(long, short)]
     quiet: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum MethodName {
-    /// Edge collapse while no face's normal turns by more than --epsilon (Silva & Gomes)
-    Nsa,
-    /// Quadric edge collapse (Garland & Heckbert)
-    Quadric,
-    /// Vertex clustering on a grid: fastest, coarsest, does not keep topology
-    Cluster,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum PlacementName {
-    Endpoint,
-    Midpoint,
-    Optimal,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ScheduleName {
-    Exact,
-    Bulk,
 }
 
 impl Args {
@@ -165,7 +122,7 @@ impl Args {
         let file = self.input.name();
 
         // All within one pool, so that reading and writing keep to the number of threads too.
-        let (summary, counts, seconds, written) = common::in_pool(self.threads, || {
+        let (summary, counts, seconds, written) = common::in_pool(self.collapsing.threads, || {
             let scene = self.input.read(&mut warnings)?.decoded.scene;
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
@@ -234,16 +191,9 @@ impl Args {
     }
 
     fn job(&self) -> Result<Job, Failure> {
-        let only =
-            |flag: &str, given: bool, method: MethodName, of: &str| match given && self.method != method {
-                true => Err(Failure::Usage(format!("{flag} is for --method {of}"))),
-                false => Ok(()),
-            };
-        only("--epsilon", self.epsilon.is_some(), MethodName::Nsa, "nsa")?;
-        only("--passes", self.passes.is_some(), MethodName::Nsa, "nsa")?;
-        only("--schedule", self.schedule.is_some(), MethodName::Quadric, "quadric")?;
-        only("--refit", self.refit.is_some_and(|n| n > 0), MethodName::Quadric, "quadric")?;
-        let fixed = self.keep_vertices || self.placement.is_some_and(|p| p != PlacementName::Optimal);
+        self.method.allow("--refit", self.refit.is_some_and(|n| n > 0), MethodName::Quadric)?;
+        let fixed =
+            self.keep_vertices || self.collapsing.placement.is_some_and(|p| p != PlacementName::Optimal);
         if fixed && self.refit.is_some_and(|n| n > 0) {
             return Err(Failure::Usage(
                 "--refit moves vertices: it goes with --placement optimal only, not with --keep-vertices"
@@ -254,39 +204,19 @@ impl Args {
         if !target && self.method != MethodName::Nsa {
             return Err(Failure::Usage("how far? Give --ratio R, --triangles N or --max-error E".into()));
         }
-        if self.keep_vertices && self.placement.is_some_and(|p| p != PlacementName::Endpoint) {
+        if self.keep_vertices && self.collapsing.placement.is_some_and(|p| p != PlacementName::Endpoint) {
             return Err(Failure::Usage(
                 "--keep-vertices moves no vertex: --placement can only be endpoint".into(),
             ));
         }
-        let mut job = Job::default();
+        let mut job = self.collapsing.job(self.method)?;
         let o = &mut job.options;
-        o.method = match self.method {
-            MethodName::Nsa => engine::Method::Nsa,
-            MethodName::Quadric => engine::Method::Quadric,
-            MethodName::Cluster => engine::Method::Cluster,
-        };
-        o.placement = self.placement.map(|p| match p {
-            PlacementName::Endpoint => engine::Placement::Endpoint,
-            PlacementName::Midpoint => engine::Placement::Midpoint,
-            PlacementName::Optimal => engine::Placement::Optimal,
-        });
-        o.schedule = self.schedule.map(|s| match s {
-            ScheduleName::Exact => engine::Schedule::Exact,
-            ScheduleName::Bulk => engine::Schedule::Bulk,
-        });
         o.refit = self.refit;
         o.triangles = self.triangles;
         o.ratio = self.ratio;
         o.max_error = self.max_error.map(|value| MaxError { value, relative: self.relative });
-        o.epsilon = self.epsilon;
-        o.passes = self.passes;
-        o.lock_border = self.lock_border;
         o.keep_vertices = self.keep_vertices;
         o.prune = self.prune;
-        o.threads = self.threads;
-        job.weld = self.shape.weld();
-        job.normals = self.shape.normals()?;
         job.per_mesh = self.per_mesh;
         job.measure = self.measure;
         job.certified = self.certified;
@@ -297,17 +227,9 @@ impl Args {
         Ok(job)
     }
 
-    fn method_name(&self) -> &'static str {
-        match self.method {
-            MethodName::Nsa => "nsa",
-            MethodName::Quadric => "quadric",
-            MethodName::Cluster => "cluster",
-        }
-    }
-
     fn locks(&self) -> bool {
         let named = !self.lock_material.is_empty() || !self.lock_group.is_empty();
-        named || self.lock_border || self.lock_property.is_some()
+        named || self.collapsing.lock_border || self.lock_property.is_some()
     }
 }
 

@@ -6,6 +6,7 @@ pub(crate) mod soups;
 
 use progmesh_aif::*;
 use progmesh_meshes::{GenerateOptions, Sample, generate};
+use proptest::prelude::*;
 
 /// The arrays of a sample, with its normals and uvs as wedges.
 pub(crate) fn input_of(s: &Sample) -> MeshInput {
@@ -84,4 +85,21 @@ pub(crate) fn drawn(art: &str, faces: &str) -> (Mesh, Vec<char>) {
     let id = |c: char| names.iter().position(|&n| n == c).unwrap() as u32;
     let corners: Vec<u32> = faces.iter().flat_map(|f| f.chars()).map(id).collect();
     (Mesh::from_polygons(points, &sizes, &corners).unwrap(), names)
+}
+
+/// Name, faces (fewer than `most`), seed.
+pub(crate) fn any_sample(most: usize) -> impl Strategy<Value = (&'static str, usize, u64)> {
+    let names = [
+        "scan",
+        "sphere",
+        "torus",
+        "terrain",
+        "cad",
+        "polygons",
+        "quad-sphere",
+        "nonmanifold",
+        "squashed",
+        "soup",
+    ];
+    (prop::sample::select(names.to_vec()), 30..most, 0u64..1000)
 }

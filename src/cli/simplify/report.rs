@@ -34,7 +34,7 @@ impl Args {
             thousands(s.faces_out),
             thousands(s.vertices_out),
             n.instances(),
-            self.method_name(),
+            self.method.name(),
             t.total,
             t.read,
             t.build,
@@ -64,7 +64,7 @@ impl Args {
     ) -> Report {
         Report {
             command: "simplify",
-            method: self.method_name(),
+            method: self.method.name(),
             faces_in: s.faces_in,
             faces_out: s.faces_out,
             vertices_out: s.vertices_out,
