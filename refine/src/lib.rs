@@ -9,8 +9,8 @@
 //! one collapse takes time in proportion to the valence, and memory is one flat record of about 100 bytes a collapse.
 //!
 //! There now: the multiresolution scheme in memory, [progressive meshes](progressive), their [files and
-//! streams](mod@format), [geomorphs](geomorph), and [views](view): cameras, their planes, what they cannot see. Not there yet:
-//! view-dependent refinement; it will build on the same records.
+//! streams](mod@format), [geomorphs](geomorph), [views](view): cameras, their planes, what they cannot see; and [view-dependent
+//! refinement](selective) over a [hierarchy].
 //!
 //! ```
 //! use progmesh_refine::{History, simplify::{Options, Quiet}};
@@ -25,11 +25,14 @@
 
 pub mod format;
 pub mod geomorph;
+pub mod hierarchy;
 pub mod progressive;
 mod record;
+pub mod selective;
 pub mod view;
 
 pub use geomorph::{Geomorph, GeomorphError};
+pub use hierarchy::Hierarchy;
 pub use progmesh_aif as aif;
 pub use progmesh_simplify as simplify;
 pub use progressive::{Cursor, ProgressiveMesh};

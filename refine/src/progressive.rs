@@ -14,9 +14,12 @@ mod input;
 mod links;
 mod order;
 
+pub(crate) use attributes::Explicit;
 pub use build::{Built, BuiltAll, EncodeError, build, build_all};
 pub use cursor::{Cursor, Damage, Patch};
+pub(crate) use fans::{Fans, Opening};
 pub use input::{InputOrder, Polygons, same_positions};
+pub(crate) use links::{Half, link_faces};
 pub use order::NotInOrder;
 pub(crate) use order::RowsOf;
 
@@ -174,7 +177,7 @@ impl SplitCode {
 /// The wedges of the old vertex on the left and on the right of a seam that is to run through the new one: those at both ends of the run of
 /// faces that go there, unless these are one, as when the seam turns off at `vl` or `vr`; then the face beyond the cut tells the other.
 #[inline]
-fn seam_wedges(first: u32, last: u32, outer_l: Option<u32>, outer_r: Option<u32>) -> (u32, u32) {
+pub(crate) fn seam_wedges(first: u32, last: u32, outer_l: Option<u32>, outer_r: Option<u32>) -> (u32, u32) {
     match (outer_l, outer_r) {
         _ if first != last => (first, last),
         (Some(o), _) if o != first => (o, last),

@@ -73,22 +73,22 @@ impl WedgeState {
 
 /// An entry of [`WedgeStreams::explicit`].
 #[derive(Clone, Debug, Default)]
-pub(super) struct Explicit {
+pub(crate) struct Explicit {
     /// (wedge before, wedge after) of the faces that go to the new vertex.
-    pub(super) pairs: Vec<(u32, u32)>,
-    pub(super) changed: Vec<u32>,
+    pub(crate) pairs: Vec<(u32, u32)>,
+    pub(crate) changed: Vec<u32>,
     /// Wedges of the new faces at the old vertex, the new one, the tip.
-    pub(super) corners: Vec<[u32; 3]>,
+    pub(crate) corners: Vec<[u32; 3]>,
     /// New wedges among the pairs.
-    pub(super) new: usize,
+    pub(crate) new: usize,
     /// Where the next entry begins.
-    pub(super) end: usize,
+    pub(crate) end: usize,
 }
 
 impl Explicit {
     /// The entry at `at`, when there are `wedges` wedges; `None` if the stream ends in it or it names wedges that cannot be. New wedges must
     /// come in order.
-    pub(super) fn read(stream: &[u32], at: usize, two_faces: bool, wedges: u32) -> Option<Explicit> {
+    pub(crate) fn read(stream: &[u32], at: usize, two_faces: bool, wedges: u32) -> Option<Explicit> {
         let &[pairs, changed] = stream.get(at..at + 2)? else { return None };
         let (pairs, changed) = (pairs as usize, changed as usize);
         let sizes = [pairs.checked_mul(2)?, changed, 3 * (1 + two_faces as usize)];

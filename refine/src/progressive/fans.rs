@@ -6,32 +6,32 @@ use crate::aif::NONE;
 
 /// Corners (as wedges) and links of the faces there are.
 #[derive(Clone, Debug)]
-pub(super) struct Fans {
-    pub(super) corners: Vec<[u32; 3]>,
-    pub(super) links: Vec<[u32; 3]>,
+pub(crate) struct Fans {
+    pub(crate) corners: Vec<[u32; 3]>,
+    pub(crate) links: Vec<[u32; 3]>,
 }
 
 /// An edge of the split vertex that opens: the face that goes to the new vertex, and the one that stays, as far as they are there.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Opening {
-    pub(super) inner: Option<Half>,
-    pub(super) outer: Option<Half>,
+pub(crate) struct Opening {
+    pub(crate) inner: Option<Half>,
+    pub(crate) outer: Option<Half>,
 }
 
 /// Where a split opens the fan of its vertex.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Gap {
-    pub(super) left: Opening,
+pub(crate) struct Gap {
+    pub(crate) left: Opening,
     /// Of a split at a border: the edge where the fan ends.
-    pub(super) right: Opening,
+    pub(crate) right: Opening,
     /// Faces from the left to the right: those that go to the new vertex.
-    pub(super) faces: usize,
+    pub(crate) faces: usize,
 }
 
 impl Fans {
     /// The wedge at the vertex that `h` is seen from.
     #[inline]
-    pub(super) fn wedge(&self, h: Half) -> u32 {
+    pub(crate) fn wedge(&self, h: Half) -> u32 {
         self.corners[h.face as usize][h.corner()]
     }
 
@@ -43,7 +43,7 @@ impl Fans {
 
     /// The same edge in the face across.
     #[inline]
-    pub(super) fn across(&self, h: Half) -> Option<Half> {
+    pub(crate) fn across(&self, h: Half) -> Option<Half> {
         across(h, self.links[h.face as usize][h.edge as usize])
     }
 
@@ -51,7 +51,7 @@ impl Fans {
     ///
     /// Errors: cuts that are no edges, or of different fans.
     #[inline]
-    pub(super) fn find_gap(
+    pub(crate) fn find_gap(
         &self,
         i: usize,
         (cut, right): (u32, u32),
@@ -97,7 +97,7 @@ impl Fans {
     }
 
     /// Appends the edges around the vertex of split `i`, from its left cut on, each as `cut << 1 | starts`. O(valence).
-    pub(super) fn around(
+    pub(crate) fn around(
         &self,
         i: usize,
         cut: u32,
@@ -127,7 +127,7 @@ impl Fans {
 
     /// Gives the corners of `count` faces at a vertex, from `first` on, the wedges that `map` says; `seen` is told every index-buffer entry.
     #[inline]
-    pub(super) fn hand_over(
+    pub(crate) fn hand_over(
         &mut self,
         first: Option<Half>,
         count: usize,
@@ -149,7 +149,7 @@ impl Fans {
 
     /// The wedge at the tip of a new face: its neighbour's, at the new vertex or at the old.
     #[inline]
-    pub(super) fn tip(&self, at: Opening, from_inner: bool) -> u32 {
+    pub(crate) fn tip(&self, at: Opening, from_inner: bool) -> u32 {
         let (a, b) = if from_inner { (at.inner, at.outer) } else { (at.outer, at.inner) };
         a.or(b).map_or(NONE, |h| self.far_wedge(h))
     }
@@ -157,18 +157,32 @@ impl Fans {
     /// Appends the face with these corners (old vertex, new vertex, tip) into an opening; returns its edge between the old vertex and
     /// the new one, seen from the old.
     #[inline]
-    pub(super) fn insert(
+    pub(crate) fn insert(
         &mut self,
         (a, vu_next): (usize, bool),
         [vt, vu, tip]: [u32; 3],
         at: Opening,
     ) -> Half {
         let f = self.corners.len() as u32;
+        self.corners.push([NONE; 3]);
+        self.links.push([NONE; 3]);
+        self.insert_at(f, (a, vu_next), [vt, vu, tip], at)
+    }
+
+    /// The same in slot `f`, which is there and holds no face.
+    #[inline]
+    pub(crate) fn insert_at(
+        &mut self,
+        f: u32,
+        (a, vu_next): (usize, bool),
+        [vt, vu, tip]: [u32; 3],
+        at: Opening,
+    ) -> Half {
         let (b, c) = (next(a), previous(a));
         let mut corners = [tip; 3];
         (corners[b], corners[c]) = if vu_next { (vu, vt) } else { (vt, vu) };
-        self.corners.push(corners);
-        self.links.push([NONE; 3]);
+        self.corners[f as usize] = corners;
+        self.links[f as usize] = [NONE; 3];
         let (old, new) = sides(f, a, vu_next);
         if let Some(outer) = at.outer {
             self.connect(old, outer);
@@ -181,21 +195,21 @@ impl Fans {
 
     /// Links two half-edges, both seen from the same vertex.
     #[inline]
-    pub(super) fn connect(&mut self, x: Half, y: Half) {
+    pub(crate) fn connect(&mut self, x: Half, y: Half) {
         self.links[x.face as usize][x.edge as usize] = link(x, y);
         self.links[y.face as usize][y.edge as usize] = link(y, x);
     }
 
     /// What a split's face lies between.
     #[inline]
-    pub(super) fn opening_of(&self, f: u32, (a, vu_next): (usize, bool)) -> Opening {
+    pub(crate) fn opening_of(&self, f: u32, (a, vu_next): (usize, bool)) -> Opening {
         let (old, new) = sides(f, a, vu_next);
         Opening { inner: self.across(new), outer: self.across(old) }
     }
 
     /// The wedges of a split's face at the old vertex and at the new one.
     #[inline]
-    pub(super) fn ends_of(&self, f: u32, (a, vu_next): (usize, bool)) -> (u32, u32) {
+    pub(crate) fn ends_of(&self, f: u32, (a, vu_next): (usize, bool)) -> (u32, u32) {
         let c = &self.corners[f as usize];
         let (b, d) = (c[next(a)], c[previous(a)]);
         if vu_next { (d, b) } else { (b, d) }
@@ -203,7 +217,7 @@ impl Fans {
 
     /// How many faces of a vertex follow from `first` before one that is not below `end`, or a border.
     #[inline]
-    pub(super) fn run_length(&self, first: Option<Half>, end: u32) -> usize {
+    pub(crate) fn run_length(&self, first: Option<Half>, end: u32) -> usize {
         let (mut entry, mut count) = (first, 0);
         while let Some(h) = entry.filter(|h| h.face < end) {
             count += 1;
@@ -214,7 +228,7 @@ impl Fans {
 
     /// Closes an opening whose face is going.
     #[inline]
-    pub(super) fn close(&mut self, at: Opening) {
+    pub(crate) fn close(&mut self, at: Opening) {
         match (at.outer, at.inner) {
             (Some(o), Some(i)) => self.connect(o, i),
             (Some(h), None) | (None, Some(h)) => self.links[h.face as usize][h.edge as usize] = NONE,
@@ -223,7 +237,7 @@ impl Fans {
     }
 
     /// The wedges in the fan of the vertex that `start` is seen from, each once.
-    pub(super) fn wedges_around(&self, start: Half) -> Vec<u32> {
+    pub(crate) fn wedges_around(&self, start: Half) -> Vec<u32> {
         let mut found = vec![self.wedge(start)];
         // Both ways round, so that a border does not hide a side.
         for first in [start.turn(), start] {

@@ -7,29 +7,29 @@ use crate::aif::NONE;
 
 /// An edge of a face, seen from a vertex at one of its ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Half {
-    pub(super) face: u32,
-    pub(super) edge: u32,
+pub(crate) struct Half {
+    pub(crate) face: u32,
+    pub(crate) edge: u32,
     /// The face begins the edge at that vertex.
-    pub(super) starts: bool,
+    pub(crate) starts: bool,
 }
 
 impl Half {
     /// The corner of the face at the vertex.
     #[inline]
-    pub(super) fn corner(self) -> usize {
+    pub(crate) fn corner(self) -> usize {
         if self.starts { self.edge as usize } else { next(self.edge as usize) }
     }
 
     /// The corner of the face at the edge's other end.
     #[inline]
-    pub(super) fn far_corner(self) -> usize {
+    pub(crate) fn far_corner(self) -> usize {
         if self.starts { next(self.edge as usize) } else { self.edge as usize }
     }
 
     /// The face's other edge at the vertex.
     #[inline]
-    pub(super) fn turn(self) -> Half {
+    pub(crate) fn turn(self) -> Half {
         let c = self.corner();
         if self.starts {
             Half { edge: previous(c) as u32, starts: false, ..self }
@@ -40,36 +40,36 @@ impl Half {
 
     /// As references name it.
     #[inline]
-    pub(super) fn code(self) -> u32 {
+    pub(crate) fn code(self) -> u32 {
         self.face << 2 | self.edge
     }
 }
 
 #[inline]
-pub(super) fn next(k: usize) -> usize {
+pub(crate) fn next(k: usize) -> usize {
     if k == 2 { 0 } else { k + 1 }
 }
 
 #[inline]
-pub(super) fn previous(k: usize) -> usize {
+pub(crate) fn previous(k: usize) -> usize {
     if k == 0 { 2 } else { k - 1 }
 }
 
 /// The link that stands in the face of `from`, to `to`, both seen from the same vertex.
 #[inline]
-pub(super) fn link(from: Half, to: Half) -> u32 {
+pub(crate) fn link(from: Half, to: Half) -> u32 {
     to.face << 3 | ((from.starts == to.starts) as u32) << 2 | to.edge
 }
 
 /// Where `link`, which stands at `from`, leads, seen from the same vertex.
 #[inline]
-pub(super) fn across(from: Half, link: u32) -> Option<Half> {
+pub(crate) fn across(from: Half, link: u32) -> Option<Half> {
     let to = Half { face: link >> 3, edge: link & 3, starts: from.starts == (link >> 2 & 1 == 1) };
     Some(to).filter(|_| link != NONE)
 }
 
 /// The links of faces given by the vertices of their corners. Edges of exactly two faces are linked. O(n log n) at worst.
-pub(super) fn link_faces(faces: &[[u32; 3]], vertices: usize) -> Vec<[u32; 3]> {
+pub(crate) fn link_faces(faces: &[[u32; 3]], vertices: usize) -> Vec<[u32; 3]> {
     // Half-edges in the buckets of their lower vertices, long buckets sorted.
     let mut starts = vec![0u32; vertices + 1];
     let low = |f: &[u32; 3], k: usize| f[k].min(f[next(k)]) as usize;

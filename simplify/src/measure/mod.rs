@@ -49,3 +49,4 @@ pub use intersections::{SelfIntersections, self_intersections};
 pub use query::{ClosestPoint, Query};
 pub use shape::{TopologySummary, TriangleQuality, triangle_quality};
 pub use surface::{Points, Surface};
+pub use triangle::closest_on_triangle;

@@ -48,6 +48,16 @@ pub(crate) fn closest(t: [DVec3; 3], p: DVec3) -> Foot {
     best
 }
 
+/// The point of triangle `t` closest to `p`, as the weights of its three corners, and its squared distance. Slivers, segments and points are
+/// triangles too.
+///
+/// The squared distance is never below the true one by more than rounding. O(1).
+#[inline]
+pub fn closest_on_triangle(t: [DVec3; 3], p: DVec3) -> ([f64; 3], f64) {
+    let foot = closest(t, p);
+    ([1.0 - foot.v - foot.w, foot.v, foot.w], foot.d2)
+}
+
 /// The same for slivers, segments and points: all sides, and the inside by orthogonalisation on the longest side, which is off by the
 /// condition, not its square.
 #[cold]

@@ -1,0 +1,311 @@
+//! Spheres, cones and errors of all splits, from walks from the finest mesh to the base.
+//!
+//! Samples of the finest mesh, its vertices and the middles of its edges, lie in buckets of the faces that are nearest to them. When a split is
+//! undone, the samples around it look for their nearest face again: among those around the vertex, and from there from face to face. What is
+//! found is a distance to some face, so never below the true one.
+
+use super::Options;
+use super::bounds::{Bounds, Cone, pack_up, unpack};
+use super::forest::Forest;
+use crate::aif::NONE;
+use crate::progressive::ProgressiveMesh;
+use crate::selective::Front;
+use crate::simplify::measure::closest_on_triangle;
+use crate::view::NormalCone;
+use glam::DVec3;
+
+/// Samples a face beyond which only the vertices among them are kept: there are enough then.
+const ENOUGH: usize = 24;
+/// Faces that a sample walks over at most, beyond the star it lay on.
+const WALK: usize = 32;
+
+struct Sample {
+    at: DVec3,
+    /// The vertices of its edge; a vertex has itself twice.
+    owners: [u32; 2],
+    next: u32,
+}
+
+struct Walk<'a> {
+    pm: &'a ProgressiveMesh,
+    forest: &'a Forest,
+    front: Front,
+    samples: Vec<Sample>,
+    /// The first sample on the face in each slot.
+    first: Vec<u32>,
+    /// For every vertex the one it has gone into, to be followed.
+    into: Vec<u32>,
+    /// For every vertex the last split undone at it: the candidate of its node.
+    candidate: Vec<u32>,
+    error: Vec<f64>,
+    positions: Vec<DVec3>,
+}
+
+/// Bounds of all splits; `front` is at full detail. A few walks of O(n log n), for meshes whose hierarchy is as deep.
+pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: &Front, options: &Options) -> Bounds {
+    let n = forest.len();
+    let vertices = forest.base_vertices as usize + n;
+    let exact: Vec<DVec3> = (0..vertices as u32).map(|v| forest.position(pm, front.node(v), v)).collect();
+    let (lo, hi) =
+        exact.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
+    let (origin, diagonal) =
+        if exact.is_empty() { (DVec3::ZERO, 0.0) } else { (0.5 * lo + 0.5 * hi, (hi - lo).length()) };
+    let positions: Vec<DVec3> = exact.iter().map(|&p| p - origin).collect();
+    let corners: Vec<[u32; 3]> = front.corners().iter().map(|f| f.map(|w| front.wedge_vertex(w))).collect();
+    let mut bounds = Bounds {
+        origin,
+        diagonal,
+        error: vec![0; n],
+        radius: vec![0; n],
+        axis: vec![0; n],
+        angle: vec![0; n],
+    };
+    spheres_and_cones(pm, forest, &positions, &corners, &mut bounds);
+    let mut error = vec![0.0; n];
+    // In the order of the splits; then as cuts of equal error follow on each other; then with neighbours at other levels.
+    let walk = |order: &mut dyn Iterator<Item = u32>, error: Vec<f64>| {
+        let mut walk = Walk::new(pm, forest, front.clone(), &positions, &corners, error);
+        order.for_each(|i| walk.undo(i, origin));
+        walk.error
+    };
+    error = walk(&mut (0..n as u32).rev(), error);
+    for round in 0..options.rounds {
+        let cell = diagonal / [f64::INFINITY, 6.0, 17.0][round as usize % 3];
+        let weight = |i: u32| {
+            let p = forest.position(pm, forest.parent[i as usize], pm.splits.vertex[i as usize]) - origin;
+            let k = (p / cell.max(f64::MIN_POSITIVE)).floor();
+            // Every other cell, like the fields of a chess board, is as if it were out of view.
+            let odd = (k.x + k.y + k.z).rem_euclid(2.0) == 1.0;
+            if cell.is_finite() && odd == (round % 2 == 0) { FAR } else { 1.0 }
+        };
+        error = walk(&mut by_error(forest, |i| error[i as usize] * weight(i)).into_iter(), error);
+    }
+    // What was raised in one order, is raised in the hierarchy.
+    for i in (0..n as u32).rev() {
+        let above = forest.maker(forest.parent[i as usize]);
+        let e = error[i as usize];
+        bounds.error[i as usize] = pack_up(e * options.margin.max(1.0));
+        if above != NONE {
+            let up = &mut error[above as usize];
+            *up = up.max(e);
+        }
+    }
+    bounds
+}
+
+/// What errors out of view count in a walk.
+const FAR: f64 = 1.0 / 64.0;
+
+/// All splits in an order in which they can be undone: those of the least errors first, and what depends on a split before it.
+fn by_error(forest: &Forest, error: impl Fn(u32) -> f64) -> Vec<u32> {
+    let n = forest.len() as u32;
+    let mut least: Vec<f64> = (0..n).map(error).collect();
+    for i in (0..n).rev() {
+        let e = least[i as usize];
+        for d in forest.needs(i).into_iter().filter(|&d| d != NONE) {
+            let up = &mut least[d as usize];
+            *up = up.max(e);
+        }
+    }
+    let mut order: Vec<u32> = (0..n).rev().collect();
+    // Stable: of equal ones the later split goes first.
+    order.sort_by(|&a, &b| least[a as usize].total_cmp(&least[b as usize]));
+    order
+}
+
+fn spheres_and_cones(
+    pm: &ProgressiveMesh,
+    forest: &Forest,
+    positions: &[DVec3],
+    corners: &[[u32; 3]],
+    bounds: &mut Bounds,
+) {
+    // Added to radii at every level: rounding of centres and of what is decided about them never shows.
+    let slack = bounds.diagonal * 1e-6;
+    let mut radius = vec![0.0f64; positions.len()];
+    let mut cone: Vec<Option<NormalCone>> = vec![None; positions.len()];
+    for f in corners {
+        let p = f.map(|v| positions[v as usize]);
+        let normal = (p[1] - p[0]).cross(p[2] - p[0]);
+        for k in 0..3 {
+            let r = &mut radius[f[k] as usize];
+            *r = r.max(p[k].distance(p[(k + 1) % 3])).max(p[k].distance(p[(k + 2) % 3]));
+            // Faces without area show nothing.
+            if normal.length_squared() > 0.0 {
+                let own = NormalCone::new(normal, 0.0);
+                let c = &mut cone[f[k] as usize];
+                *c = Some(c.map_or(own, |c| c.join(&own)));
+            }
+        }
+    }
+    radius.iter_mut().for_each(|r| *r += slack);
+    for i in (0..forest.len() as u32).rev() {
+        let k = i as usize;
+        let (vs, vu) = (pm.splits.vertex[k] as usize, forest.base_vertices as usize + k);
+        // As splits see centres: rounded.
+        let place =
+            |node: u32, v: usize| (forest.position(pm, node, v as u32) - bounds.origin).as_vec3().as_dvec3();
+        let centre = place(forest.parent[k], vs);
+        let [old, new] = forest.nodes(i);
+        let reach = |node: u32, v: usize| centre.distance(place(node, v)) + radius[v];
+        bounds.radius[k] = pack_up(reach(old, vs).max(reach(new, vu)) + slack);
+        radius[vs] = unpack(bounds.radius[k]) as f64;
+        let joined = match (cone[vs], cone[vu]) {
+            (Some(a), Some(b)) => Some(a.join(&b)),
+            (a, b) => a.or(b),
+        };
+        let stored = joined.map_or(Cone::ALL, |c| Cone::around(&c));
+        (bounds.axis[k], bounds.angle[k]) = (stored.axis, stored.angle);
+        cone[vs] = joined.map(|_| stored.unpack());
+    }
+}
+
+impl<'a> Walk<'a> {
+    fn new(
+        pm: &'a ProgressiveMesh,
+        forest: &'a Forest,
+        front: Front,
+        positions: &[DVec3],
+        corners: &[[u32; 3]],
+        error: Vec<f64>,
+    ) -> Self {
+        let mut samples: Vec<Sample> = Vec::with_capacity(4 * positions.len());
+        let mut first = vec![NONE; corners.len()];
+        let mut seen = vec![false; positions.len()];
+        for (slot, f) in corners.iter().enumerate() {
+            let mut add = |at: DVec3, owners: [u32; 2]| {
+                samples.push(Sample { at, owners, next: first[slot] });
+                first[slot] = (samples.len() - 1) as u32;
+            };
+            for k in 0..3 {
+                let (a, b) = (f[k], f[(k + 1) % 3]);
+                if !std::mem::replace(&mut seen[a as usize], true) {
+                    add(positions[a as usize], [a, a]);
+                }
+                // Once an edge, by the face in the lower slot.
+                if front.across(slot as u32, k).is_none_or(|o| slot as u32 <= o) {
+                    add(0.5 * (positions[a as usize] + positions[b as usize]), [a, b]);
+                }
+            }
+        }
+        Walk {
+            pm,
+            forest,
+            samples,
+            first,
+            into: (0..positions.len() as u32).collect(),
+            candidate: vec![NONE; positions.len()],
+            error,
+            positions: positions.to_vec(),
+            front,
+        }
+    }
+
+    /// The vertex that `v` has gone into.
+    fn holder(&mut self, mut v: u32) -> u32 {
+        while self.into[v as usize] != v {
+            let up = self.into[v as usize];
+            self.into[v as usize] = self.into[up as usize];
+            v = up;
+        }
+        v
+    }
+
+    fn triangle(&self, slot: u32) -> [DVec3; 3] {
+        self.front.corners()[slot as usize].map(|w| self.positions[self.front.wedge_vertex(w) as usize])
+    }
+
+    fn undo(&mut self, i: u32, origin: DVec3) {
+        let k = i as usize;
+        let (vs, vu) = (self.pm.splits.vertex[k], self.forest.base_vertices + i);
+        let mut star = Vec::with_capacity(16);
+        let [old, new] = self.front.middle(self.pm, self.forest, i);
+        self.front.star(old, &mut star);
+        self.front.star(new, &mut star);
+        let beside = self.front.beside(self.pm, self.forest, i);
+        let mut loose = Vec::with_capacity(64);
+        for slot in star {
+            let mut s = std::mem::replace(&mut self.first[slot as usize], NONE);
+            while s != NONE {
+                loose.push(s);
+                s = self.samples[s as usize].next;
+            }
+        }
+        self.front.unsplit(self.pm, self.forest, i);
+        self.positions[vs as usize] = self.forest.position(self.pm, self.forest.parent[k], vs) - origin;
+        self.into[vu as usize] = vs;
+        let below = [self.candidate[vs as usize], self.candidate[vu as usize]];
+        self.candidate[vs as usize] = i;
+        let below = below.into_iter().filter(|&b| b != NONE);
+        self.error[k] = below.map(|b| self.error[b as usize]).fold(self.error[k], f64::max);
+        let mut star = Vec::with_capacity(16);
+        if let Some(h) = beside {
+            self.front.star(h, &mut star);
+        }
+        if loose.len() > ENOUGH * star.len() {
+            let samples = &self.samples;
+            loose.retain(|&s| samples[s as usize].owners[0] == samples[s as usize].owners[1]);
+        }
+        let triangles: Vec<[DVec3; 3]> = star.iter().map(|&s| self.triangle(s)).collect();
+        for s in loose {
+            self.place(s, vs, &star, &triangles);
+        }
+    }
+
+    /// Puts a sample on its nearest face, and raises the error of who answers for it.
+    fn place(&mut self, s: u32, vs: u32, star: &[u32], triangles: &[[DVec3; 3]]) {
+        let p = self.samples[s as usize].at;
+        let (mut best, mut slot, mut weights) = (f64::INFINITY, NONE, [0.0; 3]);
+        for (&f, &t) in star.iter().zip(triangles) {
+            let (w, d2) = closest_on_triangle(t, p);
+            if d2 < best {
+                (best, slot, weights) = (d2, f, w);
+            }
+        }
+        // Beyond the star, while that is nearer.
+        for _ in 0..WALK {
+            let mut found = None;
+            for k in 0..3 {
+                // On the edge from corner k to the next the weight of the third is 0.
+                if weights[(k + 2) % 3] > 1e-9 {
+                    continue;
+                }
+                let Some(f) = self.front.across(slot, k).filter(|f| !star.contains(f)) else { continue };
+                let (w, d2) = closest_on_triangle(self.triangle(f), p);
+                if d2 < best {
+                    (best, found) = (d2, Some((f, w)));
+                }
+            }
+            let Some((f, w)) = found else { break };
+            (slot, weights) = (f, w);
+        }
+        if slot == NONE {
+            return;
+        }
+        self.samples[s as usize].next = std::mem::replace(&mut self.first[slot as usize], s);
+        let d = best.sqrt();
+        let owners = self.samples[s as usize].owners.map(|v| self.holder(v));
+        let error = |w: &Self, v: u32| match w.candidate[v as usize] {
+            NONE => None,
+            c => Some(w.error[c as usize]),
+        };
+        let [a, b] = owners;
+        let answers = match (error(self, a), error(self, b)) {
+            (Some(x), Some(y)) if x.max(y) >= d => return,
+            (Some(_), Some(_)) if a == vs || b == vs => vs,
+            (Some(x), Some(y)) => {
+                if x >= y {
+                    a
+                } else {
+                    b
+                }
+            }
+            (Some(_), None) => a,
+            (None, Some(_)) => b,
+            // Its edge is whole: it lies on it.
+            (None, None) => return,
+        };
+        let c = self.candidate[answers as usize] as usize;
+        self.error[c] = self.error[c].max(d);
+    }
+}

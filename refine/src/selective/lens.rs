@@ -1,0 +1,217 @@
+//! What a view needs: which splits may be seen, and how large their errors may look.
+
+use super::list::Entry;
+use crate::hierarchy::{Hierarchy, SplitBounds};
+use crate::view::{Camera, Frustum, Planes};
+use glam::{DMat3, DMat4, DVec3};
+
+/// What counts as unseen, and is left coarse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Cull {
+    /// Nothing.
+    None,
+    /// What is outside of the frustum.
+    Frustum,
+    /// What turns its back.
+    Cone,
+    /// Both.
+    #[default]
+    All,
+}
+
+/// Why there is no lens.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LensError {
+    /// The mesh is placed by a matrix that flattens it, or is no placement.
+    #[error("the mesh is placed by a matrix that is not affine, or flattens it")]
+    Placement,
+    /// No tolerance.
+    #[error("the tolerance is {0} pixels: it must not be negative")]
+    Tolerance(f64),
+}
+
+/// A camera, a tolerance and what to cull, seen from a mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct Lens {
+    /// Pixels.
+    tau: f64,
+    frustum: Option<Frustum>,
+    back: bool,
+    /// About the origin of the bounds.
+    eye: DVec3,
+    look: DVec3,
+    /// Depth of a point is `gradient . (p - eye)`.
+    gradient: DVec3,
+    steep: f64,
+    /// Pixels at depth 1 of a length of the mesh.
+    lambda: f64,
+    near: f64,
+    /// Of what is in the picture, depth is at least this times the distance from the eye, lengths of the mesh.
+    slant: f64,
+    perspective: bool,
+}
+
+impl Lens {
+    /// For a mesh that stands where `placed` puts it (the identity: where its coordinates say), seen by `camera`, with errors up to `tau` pixels.
+    ///
+    /// An error's size in pixels is lambda * error / depth, the depth that of the nearest place in its sphere, along the direction of view and never below the
+    /// near plane's. Placements may scale unevenly; errors then count by the largest stretch.
+    ///
+    /// Errors: a tolerance that is negative or NaN (infinity is one); a placement that cannot be undone.
+    pub fn new(
+        hierarchy: &Hierarchy,
+        camera: &Camera,
+        placed: &DMat4,
+        tau: f64,
+        cull: Cull,
+    ) -> Result<Lens, LensError> {
+        if tau.is_nan() || tau < 0.0 {
+            return Err(LensError::Tolerance(tau));
+        }
+        // About the origin of the bounds, so that nothing is lost far out.
+        let placed = *placed * DMat4::from_translation(hierarchy.bounds.origin);
+        let frustum = camera.frustum().in_space_of(&placed).ok_or(LensError::Placement)?;
+        let linear = DMat3::from_mat4(placed);
+        let (least, most) = stretch(&linear);
+        if !(least > 0.0 && most.is_finite()) {
+            return Err(LensError::Placement);
+        }
+        let back = placed.inverse();
+        let gradient = linear.transpose() * camera.look();
+        let (w, h) = (camera.width() as f64, camera.height() as f64);
+        let corner = 0.5 * w.hypot(h) / camera.pixel_scale();
+        Ok(Lens {
+            tau,
+            frustum: matches!(cull, Cull::Frustum | Cull::All).then_some(frustum),
+            back: matches!(cull, Cull::Cone | Cull::All),
+            eye: back.transform_point3(camera.eye()),
+            // Normals of the mesh turn with its mirror image.
+            look: (back.transform_vector3(camera.look())).normalize(),
+            gradient,
+            steep: gradient.length(),
+            lambda: camera.pixel_scale() * most,
+            near: camera.near().max(0.0),
+            slant: least / (1.0 + corner * corner).sqrt(),
+            perspective: camera.is_perspective(),
+        })
+    }
+
+    /// The tolerance, pixels.
+    pub fn tau(&self) -> f64 {
+        self.tau
+    }
+
+    /// The same with another tolerance. Errors: as [`Lens::new`].
+    pub fn with_tau(mut self, tau: f64) -> Result<Lens, LensError> {
+        if tau.is_nan() || tau < 0.0 {
+            return Err(LensError::Tolerance(tau));
+        }
+        self.tau = tau;
+        Ok(self)
+    }
+
+    /// How many pixels the error of a split may take up, at most, wherever in its sphere it is; a bound that never grows from a split to those below.
+    pub fn pixels(&self, hierarchy: &Hierarchy, b: &SplitBounds) -> f64 {
+        let centre = b.centre - hierarchy.bounds.origin;
+        self.lambda * b.error / self.depth(centre, b.radius, f64::INFINITY)
+    }
+
+    /// True if the split is needed: it may be seen, and its error may take up the tolerance or more.
+    pub fn needs(&self, hierarchy: &Hierarchy, i: usize) -> bool {
+        self.wants(&Entry::of(hierarchy, i as u32), self.tau)
+    }
+
+    /// A depth that nothing in a sphere is below, or 1 where depth does not matter; if that is more than `enough`, any above that.
+    #[inline]
+    fn depth(&self, centre: DVec3, radius: f64, enough: f64) -> f64 {
+        if !self.perspective {
+            return 1.0;
+        }
+        let d = centre - self.eye;
+        let along = self.gradient.dot(d) - self.steep * radius;
+        let along = along.max(self.near);
+        if along > enough {
+            return along;
+        }
+        // Beside the view and behind it, where depth falls to nothing, distance still counts.
+        along.max(self.slant * (d.length() - radius))
+    }
+
+    /// [`Lens::needs`] at another tolerance.
+    #[inline]
+    pub(super) fn wants(&self, e: &Entry, tau: f64) -> bool {
+        let (centre, radius) = (e.centre.as_dvec3(), e.radius as f64);
+        let size = self.lambda * e.error as f64;
+        // Depth beyond which it is fine enough; 0 / 0 is not.
+        if tau > 0.0 {
+            let fine = size / tau;
+            if self.depth(centre, radius, fine) > fine || tau == f64::INFINITY {
+                return false;
+            }
+        }
+        self.sees(e, centre, radius)
+    }
+
+    /// How many tolerances the error may take up, at most; 0 if it is not seen.
+    #[inline]
+    pub(super) fn urgency(&self, e: &Entry) -> f64 {
+        let (centre, radius) = (e.centre.as_dvec3(), e.radius as f64);
+        if !self.sees(e, centre, radius) {
+            return 0.0;
+        }
+        self.lambda * e.error as f64 / (self.depth(centre, radius, f64::INFINITY) * self.tau)
+    }
+
+    /// It may be seen.
+    #[inline]
+    pub(super) fn sees(&self, e: &Entry, centre: DVec3, radius: f64) -> bool {
+        if self.frustum.is_some_and(|f| f.sphere(centre, radius, Planes::ALL).is_none()) {
+            return false;
+        }
+        if !self.back {
+            return true;
+        }
+        let cone = e.cone().unpack();
+        !if self.perspective {
+            cone.faces_away_from(self.eye, centre, radius)
+        } else {
+            cone.faces_along(self.look)
+        }
+    }
+}
+
+/// The least and the largest factor by which a matrix stretches, the least from below and the largest from above (by at most 1e-9 of each).
+fn stretch(m: &DMat3) -> (f64, f64) {
+    let largest = |m: &DMat3| {
+        let a = m.transpose() * *m;
+        // The largest eigenvalue of a symmetric matrix, in closed form.
+        let mean = (a.x_axis.x + a.y_axis.y + a.z_axis.z) / 3.0;
+        let b = a - DMat3::from_diagonal(DVec3::splat(mean));
+        let p = ((b.x_axis.length_squared() + b.y_axis.length_squared() + b.z_axis.length_squared()) / 6.0)
+            .sqrt();
+        if p <= 1e-15 * mean {
+            return mean.sqrt();
+        }
+        let half = (0.5 * (b * (1.0 / p)).determinant()).clamp(-1.0, 1.0);
+        (mean + 2.0 * p * (half.acos() / 3.0).cos()).sqrt()
+    };
+    let (most, back) = (largest(m), largest(&m.inverse()));
+    ((1.0 - 1e-9) / back, most * (1.0 + 1e-9))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_matrix_stretches_by_its_singular_values() {
+        let turn = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.8);
+        let m = turn * DMat3::from_diagonal(DVec3::new(3.0, -0.25, 1.5)) * turn.transpose() * turn;
+        let (least, most) = stretch(&m);
+        assert!((least - 0.25).abs() < 1e-6 && (most - 3.0).abs() < 1e-6, "{least} {most}");
+        let (least, most) = stretch(&DMat3::from_diagonal(DVec3::splat(2.0)));
+        assert!((least - 2.0).abs() < 1e-6 && (most - 2.0).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,69 @@
+//! Splits that may come next, with what is needed to decide about each in one run of memory.
+
+use crate::aif::NONE;
+use crate::hierarchy::unpack;
+use crate::hierarchy::{Cone, Hierarchy};
+use glam::Vec3;
+
+/// A split and its bounds, 32 B.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entry {
+    pub(super) centre: Vec3,
+    pub(super) radius: f32,
+    pub(super) error: f32,
+    pub(super) split: u32,
+    pub(super) axis: u32,
+    pub(super) angle: u16,
+}
+
+impl Entry {
+    pub(super) fn of(h: &Hierarchy, i: u32) -> Entry {
+        let (b, k) = (&h.bounds, i as usize);
+        Entry {
+            centre: h.local_centre(i),
+            radius: unpack(b.radius[k]),
+            error: unpack(b.error[k]),
+            split: i,
+            axis: b.axis[k],
+            angle: b.angle[k],
+        }
+    }
+
+    pub(super) fn cone(&self) -> Cone {
+        Cone { axis: self.axis, angle: self.angle }
+    }
+}
+
+/// Splits in no order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct List {
+    pub(super) entries: Vec<Entry>,
+}
+
+impl List {
+    /// Adds split `i`, which is in neither list.
+    #[inline]
+    pub(super) fn push(&mut self, h: &Hierarchy, i: u32, place: &mut [u32]) {
+        debug_assert_eq!(place[i as usize], NONE);
+        place[i as usize] = self.entries.len() as u32;
+        self.entries.push(Entry::of(h, i));
+    }
+
+    /// Takes split `i` out, if it is in this list.
+    #[inline]
+    pub(super) fn remove(&mut self, i: u32, place: &mut [u32]) {
+        let at = place[i as usize] as usize;
+        if self.entries.get(at).is_none_or(|e| e.split != i) {
+            return;
+        }
+        place[i as usize] = NONE;
+        self.entries.swap_remove(at);
+        if let Some(moved) = self.entries.get(at) {
+            place[moved.split as usize] = at as u32;
+        }
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.entries.len() * size_of::<Entry>()
+    }
+}

@@ -1,0 +1,109 @@
+//! The mesh of a view, as buffers and as a mesh.
+
+use super::View;
+use crate::aif::{MeshInput, NONE, Positions, Wedges};
+use glam::DVec3;
+
+impl View {
+    /// The index buffer: three wedges a slot. A slot without a face has three equal corners. Wedges are numbered as those of the progressive mesh at full
+    /// detail, whatever is shown: they are stable slots of a vertex buffer.
+    pub fn indices(&self) -> &[[u32; 3]] {
+        self.front.corners()
+    }
+
+    /// The face of the progressive mesh in a slot of the index buffer; none in one that is free, or is not there.
+    pub fn face_in(&self, slot: usize) -> Option<u32> {
+        self.front.face_in().get(slot).copied().filter(|&f| f != NONE)
+    }
+
+    /// The slot of the index buffer that holds face `f` of the progressive mesh; `None` if it is not shown. Panics if there is no such face.
+    pub fn slot_of(&self, f: u32) -> Option<usize> {
+        Some(self.front.slot_of(f)).filter(|&s| s != NONE).map(|s| s as usize)
+    }
+
+    /// The slots of the faces across the three edges of the face in a slot, edge `k` from corner `k` to corner `k + 1`; `None` at borders and at edges of three and more
+    /// faces. Panics if there is no such slot.
+    pub fn neighbours(&self, slot: usize) -> [Option<usize>; 3] {
+        [0, 1, 2].map(|k| self.front.across(slot as u32, k).map(|s| s as usize))
+    }
+
+    /// The vertex of a wedge that is shown. Panics if there is no such wedge.
+    pub fn wedge_vertex(&self, w: u32) -> u32 {
+        self.front.wedge_vertex(w)
+    }
+
+    /// Where vertex `v` stands, model units; `None` if it is not shown. Panics if there is no such vertex.
+    pub fn position(&self, v: u32) -> Option<DVec3> {
+        let node = Some(self.front.node(v)).filter(|&k| k != NONE)?;
+        Some(self.hierarchy.forest.position(self.hierarchy.mesh(), node, v))
+    }
+
+    /// The attribute values of a wedge, and the channels it has; empty if it is not shown, or without attributes.
+    pub fn row(&self, w: u32) -> (&[f32], u64) {
+        let row = self.front.wedge_row(w) as usize;
+        match &self.hierarchy.mesh().wedges {
+            Some(s) if row < s.present.len() => {
+                (&s.rows[row * s.stride..(row + 1) * s.stride], s.present[row])
+            }
+            _ => (&[], 0),
+        }
+    }
+
+    /// The mesh as flat arrays: vertices, faces and wedges that are shown, numbered in the order of the progressive mesh. If every split is applied, this is
+    /// [`crate::Cursor::to_ordered_input`] at full detail: the input, bit for bit. O(n).
+    pub fn to_input(&self) -> MeshInput {
+        let pm = self.hierarchy.mesh();
+        let forest = &self.hierarchy.forest;
+        if pm.order.is_some()
+            && self.vertex_count() == pm.vertices()
+            && let Ok(mut cursor) = pm.cursor()
+            && cursor.seek(usize::MAX).is_ok()
+        {
+            return cursor.to_ordered_input();
+        }
+        let positions = |p: &Positions| match p {
+            Positions::F32(_) => Positions::F32(Vec::new()),
+            Positions::F64(_) => Positions::F64(Vec::new()),
+        };
+        let mut out = MeshInput { positions: positions(&pm.base_positions), ..Default::default() };
+        let mut vertex = vec![NONE; pm.vertices()];
+        let mut count = 0;
+        for (v, new) in vertex.iter_mut().enumerate() {
+            let node = self.front.node(v as u32);
+            if node != NONE {
+                forest.append_position(pm, node, &mut out.positions);
+                *new = count;
+                count += 1;
+            }
+        }
+        let mut slots: Vec<(u32, u32)> = (0u32..)
+            .zip(self.front.face_in())
+            .filter(|(_, f)| **f != NONE)
+            .map(|(slot, &f)| (f, slot))
+            .collect();
+        slots.sort_unstable();
+        let corners = || slots.iter().flat_map(|&(_, s)| self.front.corners()[s as usize]);
+        out.corners = corners().map(|w| vertex[self.front.wedge_vertex(w) as usize]).collect();
+        let per_face = |values: &[u32]| {
+            if values.is_empty() { Vec::new() } else { slots.iter().map(|s| values[s.0 as usize]).collect() }
+        };
+        (out.face_material, out.face_group) = (per_face(&pm.face_material), per_face(&pm.face_group));
+        out.wires = pm.wires.iter().map(|w| w.map(|v| vertex[v as usize])).collect();
+        if let Some(streams) = &pm.wedges
+            && let Ok(mut wedges) = Wedges::new(streams.channels.clone())
+        {
+            let mut number = vec![NONE; pm.wedge_slots()];
+            let mut used: Vec<u32> = corners().collect();
+            used.sort_unstable();
+            used.dedup();
+            for &w in &used {
+                let (row, present) = self.row(w);
+                let new = wedges.push(row, present);
+                number[w as usize] = if present == 0 { NONE } else { new };
+            }
+            wedges.corner = corners().map(|w| number[w as usize]).collect();
+            out.wedges = Some(wedges);
+        }
+        out
+    }
+}
