@@ -22,6 +22,7 @@ mod morph;
 mod picture;
 mod problems;
 mod simplify;
+mod terrain;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -50,6 +51,7 @@ enum Command {
     Compare(compare::Args),
     Convert(convert::Args),
     Generate(generate::Args),
+    Terrain(Box<terrain::Args>),
     Completions(completions::Args),
     Man(man::Args),
 }
@@ -121,6 +123,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Compare(args) => args.run(),
         Command::Convert(args) => args.run(),
         Command::Generate(args) => args.run(),
+        Command::Terrain(args) => args.run(),
         Command::Completions(args) => args.run(),
         Command::Man(args) => args.run(),
     };

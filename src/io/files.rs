@@ -4,6 +4,7 @@
 //! file in its own directory, then all are renamed, those beside the main file first, the main file last. What fails before the
 //! first rename changes nothing. No `fsync`: the guarantee is against errors and interrupts, not against power loss.
 
+use super::grid::{self, GridError, GridFile, GridOptions, ReadAt};
 use super::{
     DecodeError, Decoded, EncodeError, EncodeOptions, Encoded, Format, NoSide, Side, decode, encode, pm,
 };
@@ -13,7 +14,68 @@ use crate::scene::Scene;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A file that is read at any place, from any number of threads.
+struct OpenFile {
+    file: File,
+    length: u64,
+}
+
+impl ReadAt for OpenFile {
+    fn length(&self) -> u64 {
+        self.length
+    }
+
+    #[cfg(unix)]
+    fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()> {
+        std::os::unix::fs::FileExt::read_exact_at(&self.file, out, offset)
+    }
+
+    #[cfg(windows)]
+    fn read_at(&self, mut offset: u64, mut out: &mut [u8]) -> io::Result<()> {
+        while !out.is_empty() {
+            match std::os::windows::fs::FileExt::seek_read(&self.file, out, offset)? {
+                0 => return Err(ErrorKind::UnexpectedEof.into()),
+                n => {
+                    out = &mut out[n..];
+                    offset += n as u64;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Opens a file to be read at any place. Standard input is read whole; so is what is no regular file.
+pub fn open(path: &Path) -> io::Result<Arc<dyn ReadAt>> {
+    check_source(path)?;
+    if is_dash(path) || !fs::metadata(path)?.is_file() {
+        return Ok(Arc::new(read_bytes(path)?));
+    }
+    let file = File::open(path)?;
+    let length = file.metadata()?.len();
+    Ok(Arc::new(OpenFile { file, length }))
+}
+
+/// Why a grid could not be opened. The caller knows its name.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenGridError {
+    /// The system refused.
+    #[error("{0}")]
+    Io(io::Error),
+    /// The content is wrong, or its format unknown.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+}
+
+/// Opens a height grid: GeoTIFF, HGT, ESRI ASCII, PNG or raw, by its content or the name's extension. Its heights are read when asked for.
+pub fn open_grid(path: &Path, options: &GridOptions) -> Result<GridFile, OpenGridError> {
+    let source = open(path).map_err(OpenGridError::Io)?;
+    let name = if is_dash(path) { "standard input".into() } else { path.display().to_string() };
+    Ok(grid::open(source, &name, options)?)
+}
 
 /// Stands for standard input or output in place of a path.
 pub const DASH: &str = "-";

@@ -8,6 +8,7 @@ pub mod camera;
 pub mod files;
 pub(crate) mod flatten;
 pub mod gltf;
+pub mod grid;
 pub(crate) mod notes;
 pub mod obj;
 pub mod off;

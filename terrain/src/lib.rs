@@ -1,16 +1,27 @@
 //! # progmesh-terrain: height grids and the surfaces made of them
 //!
-//! A [`Grid`] holds samples of heights, some of them void. Grids become triangulated irregular networks here; files are read elsewhere.
+//! A [`Grid`] holds samples of heights, some of them void; a [`Raster`] gives them window by window, so that one larger than memory
+//! never lies in it whole; a [`Mosaic`] is one raster of several. A [`Georeference`] says where they lie. Grids become triangulated irregular
+//! networks here; files are read elsewhere.
 //!
 //! ```
-//! use progmesh_terrain::Grid;
+//! use progmesh_terrain::{Grid, Raster, Window};
 //! let grid = Grid::new(3, 2, vec![0.0, 1.0, 2.0, 0.5, f64::NAN, 2.5])?;
 //! assert_eq!(grid.height(2, 1), Some(2.5));
 //! assert_eq!(grid.height(1, 1), None);
 //! assert_eq!(grid.range(), Some((0.0, 2.5)));
+//! assert_eq!(grid.window(Window::new(1, 0, 2, 1)).unwrap().heights(), [1.0, 2.0]);
 //! # Ok::<(), progmesh_terrain::GridError>(())
 //! ```
 
+mod cache;
+mod georeference;
 mod grid;
+mod raster;
+mod summary;
 
+pub use cache::BlockCache;
+pub use georeference::{Affine, Crs, CrsKind, GeoKeys, Georeference, SampleAt, metres_per_degree};
 pub use grid::{Grid, GridError};
+pub use raster::{Raster, RasterError, Window, check_window};
+pub use summary::{Summary, windows};

@@ -1,0 +1,153 @@
+//! `GRID` and the flags that say how to read it.
+
+use crate::cli::Failure;
+use crate::cli::common::{self, Warnings, thousands};
+use clap::ValueEnum;
+use progmesh::io::files::{self, OpenGridError};
+use progmesh::io::grid::{ByteOrder, Encoding, GridError, GridFile, GridFormat, GridOptions, SampleType};
+use progmesh::terrain::{Grid, RasterError};
+use std::path::PathBuf;
+
+/// `GRID` and how to read it.
+#[derive(clap::Args, Debug)]
+pub(crate) struct GridInput {
+    /// The height grid to read; - for standard input
+    #[arg(value_name = "GRID")]
+    grid: PathBuf,
+    /// Format of GRID, instead of what its first bytes or its name say
+    #[arg(long, value_enum, value_name = "FORMAT", help_heading = "Grid")]
+    from: Option<GridFormatName>,
+    /// Columns and rows of raw samples (of HGT too, if it is no square)
+    #[arg(long, value_name = "WxH", value_parser = size, help_heading = "Grid")]
+    size: Option<[usize; 2]>,
+    /// Type of raw samples: u8, i8, u16, i16, u32, i32, f32 or f64; big-endian with `be` behind it
+    #[arg(long = "type", value_name = "TYPE", value_parser = sample_type, help_heading = "Grid")]
+    sample: Option<(SampleType, ByteOrder)>,
+    /// How the colours of a PNG stand for heights [default: terrain-rgb for colours, plain for grey]
+    #[arg(long, value_enum, value_name = "CODE", help_heading = "Grid")]
+    encoding: Option<EncodingName>,
+    /// The height that means no data, instead of the file's own
+    #[arg(long, value_name = "V", allow_negative_numbers = true, help_heading = "Grid")]
+    nodata: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum GridFormatName {
+    Tiff,
+    Hgt,
+    Png,
+    Raw,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum EncodingName {
+    Plain,
+    TerrainRgb,
+    Terrarium,
+}
+
+/// `4320x2161`.
+fn size(text: &str) -> Result<[usize; 2], String> {
+    let (width, height) = text.split_once(['x', 'X']).ok_or("must be columns x rows, such as 4320x2161")?;
+    let side = |t: &str| match t.parse::<usize>() {
+        Ok(n) if (1..=u32::MAX as usize).contains(&n) => Ok(n),
+        _ => Err("must be two whole numbers, 1 or more, such as 4320x2161".to_string()),
+    };
+    Ok([side(width)?, side(height)?])
+}
+
+/// `i16`, `f32be`.
+fn sample_type(text: &str) -> Result<(SampleType, ByteOrder), String> {
+    let (name, order) = match (text.strip_suffix("be"), text.strip_suffix("le")) {
+        (Some(name), _) => (name, ByteOrder::Big),
+        (_, name) => (name.unwrap_or(text), ByteOrder::Little),
+    };
+    let sample = SampleType::ALL.into_iter().find(|t| t.name() == name);
+    sample.map(|s| (s, order)).ok_or_else(|| {
+        "must be u8, i8, u16, i16, u32, i32, f32 or f64, with `be` behind it if big-endian".into()
+    })
+}
+
+/// The most samples that are held at once: 8 GiB.
+#[allow(dead_code)]
+const MOST_SAMPLES: usize = 1 << 30;
+
+impl GridInput {
+    /// Its name, for messages.
+    pub(crate) fn name(&self) -> String {
+        common::name(&self.grid, "standard input")
+    }
+
+    fn options(&self) -> GridOptions {
+        let mut options = GridOptions::default();
+        options.format = self.from.map(|f| match f {
+            GridFormatName::Tiff => GridFormat::Tiff,
+            GridFormatName::Hgt => GridFormat::Hgt,
+            GridFormatName::Png => GridFormat::Png,
+            GridFormatName::Raw => GridFormat::Raw,
+        });
+        // A type makes sense for raw samples only, whatever the name says.
+        if self.from.is_none() && self.sample.is_some() {
+            options.format = Some(GridFormat::Raw);
+        }
+        options.encoding = self.encoding.map(|e| match e {
+            EncodingName::Plain => Encoding::Plain,
+            EncodingName::TerrainRgb => Encoding::TerrainRgb,
+            EncodingName::Terrarium => Encoding::Terrarium,
+        });
+        (options.size, options.sample, options.nodata) = (self.size, self.sample, self.nodata);
+        options
+    }
+
+    /// Opens it: what it says about itself is read, and its heights when asked for.
+    pub(crate) fn open(&self, warnings: &mut Warnings) -> Result<GridFile, Failure> {
+        let file = self.name();
+        let grid = files::open_grid(&self.grid, &self.options()).map_err(|e| match e {
+            OpenGridError::Grid(GridError::UnknownFormat) => Failure::Usage(format!(
+                "{file}: neither its first bytes nor its name tell the format; say it with --from tiff|hgt|png|raw"
+            )),
+            OpenGridError::Grid(GridError::RawNeedsSize) => Failure::Usage(format!(
+                "{file}: raw samples need --size and --type, such as --size 1024x1024 --type u16"
+            )),
+            e => Failure::Input(format!("{file}: {e}")),
+        })?;
+        warnings.say(grid.warnings.iter().map(|w| format!("{file}: {w}")));
+        Ok(grid)
+    }
+}
+
+/// An error of reading heights; it names the file already.
+pub(crate) fn unread(e: RasterError) -> Failure {
+    Failure::Input(e.to_string())
+}
+
+/// All heights of a grid at once.
+#[allow(dead_code)] // for the subcommands that triangulate
+pub(crate) fn whole(name: &str, grid: &GridFile) -> Result<Grid, Failure> {
+    grid.raster.whole(MOST_SAMPLES).map_err(|e| match e {
+        RasterError::TooMany { columns, rows, limit } => Failure::Input(format!(
+            "{name}: {} x {} samples are more than the {} that are held at once",
+            thousands(columns),
+            thousands(rows),
+            thousands(limit)
+        )),
+        e => unread(e),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_types_are_read_as_written() {
+        assert_eq!(size("4320x2161"), Ok([4320, 2161]));
+        for bad in ["4320", "0x1", "1x-1", "1x1x1", "x", "1e3x5", "99999999999x1"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+        assert_eq!(sample_type("i16be"), Ok((SampleType::I16, ByteOrder::Big)));
+        assert_eq!(sample_type("f32"), Ok((SampleType::F32, ByteOrder::Little)));
+        assert_eq!(sample_type("u8le"), Ok((SampleType::U8, ByteOrder::Little)));
+        assert!(sample_type("i24").is_err() && sample_type("be").is_err() && sample_type("").is_err());
+    }
+}

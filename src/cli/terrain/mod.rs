@@ -1,0 +1,28 @@
+//! `progmesh terrain`: height grids.
+
+mod info;
+pub(crate) mod input;
+
+use super::Failure;
+
+/// Height grids: say what they hold.
+///
+/// Grids are GeoTIFF, HGT, ESRI ASCII, PNG (grey, Terrain-RGB or Terrarium) or raw samples.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand, Debug)]
+enum Command {
+    Info(info::Args),
+}
+
+impl Args {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        match self.command {
+            Command::Info(args) => args.run(),
+        }
+    }
+}
