@@ -19,6 +19,7 @@ mod georeference;
 mod grid;
 mod raster;
 mod summary;
+pub mod tin;
 
 pub use cache::BlockCache;
 pub use georeference::{Affine, Crs, CrsKind, GeoKeys, Georeference, SampleAt, metres_per_degree};

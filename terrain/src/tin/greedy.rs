@@ -1,0 +1,98 @@
+//! Greedy insertion (Garland & Heckbert 1995): a Delaunay triangulation that gets the farthest sample as a vertex, again and again.
+
+use super::Control;
+use super::delaunay::Triangulation;
+use super::field::{Field, Tolerance};
+use super::queue::Buckets;
+use super::region::Region;
+use super::scan::{Corner, farthest};
+
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Goal {
+    pub tolerance: Tolerance,
+    /// At most this many triangles, unless the outline needs more.
+    pub triangles: usize,
+}
+
+/// No sample.
+const NONE: u32 = u32::MAX;
+
+/// Inserts samples until all lie within the tolerance. `None` when cancelled.
+///
+/// O(samples log vertices) in practice: each insertion looks at the samples of the triangles it changes, about six.
+pub(super) fn greedy(
+    field: &Field,
+    region: &Region,
+    goal: Goal,
+    control: &dyn Control,
+) -> Option<Triangulation> {
+    let mut mesh = Triangulation::new(field.columns, field.rows);
+    region.constrain(&mut mesh);
+    refine(field, &mut mesh, goal, control)?;
+    Some(mesh)
+}
+
+/// The same, of a triangulation that is there: what its `changed` lists is looked at first.
+pub(super) fn refine(
+    field: &Field,
+    mesh: &mut Triangulation,
+    goal: Goal,
+    control: &dyn Control,
+) -> Option<()> {
+    let corner = |mesh: &Triangulation, v: u32| {
+        let (x, y) = mesh.points[v as usize];
+        Corner { x, y, z: field.at(x, y) }
+    };
+    let mut candidate: Vec<u32> = vec![];
+    let mut queue = Buckets::default();
+    let mut inside = (0..mesh.triangles() as u32).filter(|&t| !mesh.is_outside(t)).count();
+    let mut changed = std::mem::take(&mut mesh.changed);
+    let mut steps = 0usize;
+    loop {
+        candidate.resize(mesh.triangles(), NONE);
+        changed.append(&mut mesh.changed);
+        // Each once: a triangle is listed for every flip it took part in.
+        for &t in &changed {
+            candidate[t as usize] = NONE - 1;
+        }
+        for t in changed.drain(..) {
+            if candidate[t as usize] != NONE - 1 {
+                continue;
+            }
+            candidate[t as usize] = NONE;
+            if mesh.is_outside(t) {
+                continue;
+            }
+            let [a, b, c] = mesh.corners(t).map(|v| corner(mesh, v));
+            let far = farthest(field, a, b, c);
+            if !far.within(goal.tolerance) {
+                candidate[t as usize] = far.sample;
+                queue.push((far.miss as f64 / far.area as f64) as f32, (t, far.sample));
+            }
+        }
+        let next = loop {
+            match queue.pop() {
+                Some((t, sample)) if candidate[t as usize] == sample => break Some((t, sample)),
+                Some(_) => {}
+                None => break None,
+            }
+        };
+        let Some((t, sample)) = next else { return Some(()) };
+        if inside + 2 > goal.triangles {
+            return Some(());
+        }
+        steps += 1;
+        if steps.is_multiple_of(4096) {
+            if control.cancelled() {
+                return None;
+            }
+            control.progress(steps as f64 / (steps + queue.len()) as f64);
+        }
+        let sample = sample as usize;
+        let p = ((sample % field.columns as usize) as i32, (sample / field.columns as usize) as i32);
+        let before = mesh.triangles();
+        mesh.insert_in(t, p);
+        inside += (before..mesh.triangles()).filter(|&t| !mesh.is_outside(t as u32)).count();
+    }
+}

@@ -1,0 +1,177 @@
+//! From options to a network.
+
+use super::blocks::Pass;
+use super::field::{Field, Tolerance};
+use super::greedy::{Goal, greedy};
+use super::network::Network;
+use super::options::{Control, Made, Method, Options, Tin, TinError};
+use super::region::Region;
+use super::regular::regular;
+use crate::Grid;
+
+/// Where the blocks of a pass lie: shifted so that what one pass locked is free in the next.
+const SHIFTS: [f64; 3] = [0.0, 0.5, 0.25];
+
+/// Makes a network of a grid.
+///
+/// Greedy insertion takes O(n log v) for n samples and v vertices, improving it O(n) a pass, decimation O(n) and memory for two triangles a
+/// sample. The same network comes out for any number of threads.
+///
+/// # Errors
+/// [`TinError`]. With a count of triangles alone, a grid whose outline needs more gets those it needs.
+pub fn triangulate(grid: &Grid, options: &Options, control: &dyn Control) -> Result<Made, TinError> {
+    let (columns, rows) = (grid.columns(), grid.rows());
+    if columns.max(rows) > 65_535 || columns * rows >= u32::MAX as usize {
+        return Err(TinError::TooLarge { columns, rows });
+    }
+    let error = options.max_error.unwrap_or(0.0);
+    if !(error >= 0.0 && error.is_finite()) {
+        return Err(TinError::BadError);
+    }
+    let field = Field::new(grid, error);
+    let region = Region::new(&field);
+    if region.triangles == 0 {
+        return Err(TinError::Nothing);
+    }
+    let work = Work { field: &field, region: &region, control };
+    let (network, step) = match (options.max_error, options.triangles) {
+        (None, Some(most)) if options.method != Method::Regular => work.fewer(options, most, 0.0)?,
+        (asked, most) => {
+            // Without an error to keep, what rounding changes is kept.
+            let kept = if asked.is_some() { error } else { field.rounding };
+            let tolerance = field.tolerance(kept).ok_or_else(|| too_fine(grid, &field, error))?;
+            let made = work.make(options, tolerance).ok_or(TinError::Cancelled)?;
+            match most {
+                Some(most) if made.0.triangles.len() > most && options.method != Method::Regular => {
+                    work.fewer(options, most, error)?
+                }
+                _ => made,
+            }
+        }
+    };
+    let errors = network.errors(&field, grid.heights());
+    let tin = Tin {
+        points: network.vertices.iter().map(|v| [v.x as u32, v.y as u32]).collect(),
+        heights: network.vertices.iter().map(|v| f64::from(v.z) * field.quantum).collect(),
+        triangles: network.triangles,
+    };
+    let (valid, isolated, grid_triangles) = (region.valid, region.isolated, region.triangles);
+    Ok(Made { tin, errors, valid, isolated, grid_triangles, step })
+}
+
+fn too_fine(grid: &Grid, field: &Field, error: f64) -> TinError {
+    let greatest = grid.range().map_or(0.0, |(l, g)| l.abs().max(g.abs()));
+    TinError::TooFine { error, least: field.rounding, greatest }
+}
+
+/// Triangles that the best method leaves of those of greedy insertion, and the most networks made on the search for a count.
+const SHARE: f64 = 0.52;
+const TRIES: usize = 10;
+
+struct Work<'a> {
+    field: &'a Field,
+    region: &'a Region,
+    control: &'a dyn Control,
+}
+
+impl Work<'_> {
+    /// At most `most` triangles, with about the least error that allows them: the error that greedy insertion has with as many as the method
+    /// will halve, then a search. With counts within 3 % it ends.
+    fn fewer(
+        &self,
+        options: &Options,
+        most: usize,
+        least: f64,
+    ) -> Result<(Network, Option<usize>), TinError> {
+        let field = self.field;
+        let exact = field.tolerance(field.rounding).unwrap_or_default();
+        let share = if options.method == Method::Greedy { 1.0 } else { SHARE };
+        let goal = Goal { tolerance: exact, triangles: (most as f64 / share) as usize };
+        let start = self.greedy(goal).ok_or(TinError::Cancelled)?;
+        if options.method == Method::Greedy {
+            return Ok((start, None));
+        }
+        let mut error = start.greatest(field).max(least).max(field.quantum);
+        // Errors known to give too many triangles, and few enough.
+        let (mut many, mut few) = (least, f64::INFINITY);
+        let mut best: Option<(Network, Option<usize>)> = None;
+        for _ in 0..TRIES {
+            let tolerance = field.tolerance(error).unwrap_or_default();
+            let made = self.make(options, tolerance).ok_or(TinError::Cancelled)?;
+            let count = made.0.triangles.len();
+            if count <= most {
+                few = error;
+                best = Some(made);
+                if count * 100 >= most * 97 {
+                    break;
+                }
+            } else {
+                many = error;
+                if best.is_none() && error > 4.0 * field.span() {
+                    // What is left is the outline.
+                    best = Some(made);
+                    break;
+                }
+            }
+            // Counts go with the error to the power of about -1.4; aim 1 % below.
+            let aim = error * (count as f64 / (most as f64 * 0.99)).powf(1.0 / 1.4);
+            error = if few.is_infinite() {
+                aim.max(many * 1.02)
+            } else if aim > many && aim < few {
+                aim
+            } else {
+                many.midpoint(few)
+            };
+        }
+        match best {
+            Some(best) => Ok(best),
+            None => self
+                .make(options, field.tolerance(4.0 * field.span()).unwrap_or_default())
+                .ok_or(TinError::Cancelled),
+        }
+    }
+
+    /// `None` when cancelled.
+    fn make(&self, options: &Options, tolerance: Tolerance) -> Option<(Network, Option<usize>)> {
+        let goal = Goal { tolerance, triangles: options.triangles.unwrap_or(usize::MAX) };
+        let network = match options.method {
+            Method::Regular => {
+                let asked = options.max_error.map(|_| tolerance);
+                let (network, step) =
+                    regular(self.field, self.region, asked, options.triangles, self.control)?;
+                return Some((network, Some(step)));
+            }
+            Method::Greedy => self.greedy(goal)?,
+            Method::Decimation => self.decimation(tolerance)?,
+            Method::Best => self.best(tolerance, !options.on_samples)?,
+        };
+        Some((network, None))
+    }
+
+    fn greedy(&self, goal: Goal) -> Option<Network> {
+        Some(Network::of(&greedy(self.field, self.region, goal, self.control)?, self.field))
+    }
+
+    fn best(&self, tolerance: Tolerance, free_heights: bool) -> Option<Network> {
+        let mut network = self.greedy(Goal { tolerance, triangles: usize::MAX })?;
+        for (i, shift) in SHIFTS.into_iter().enumerate() {
+            let done = [i, i + 1].map(|i| i as f64 / SHIFTS.len() as f64);
+            network.improve(self.field, tolerance, Pass { shift, free_heights, done }, self.control)?;
+        }
+        Some(network)
+    }
+
+    fn decimation(&self, tolerance: Tolerance) -> Option<Network> {
+        let mut network = Network::full(self.field, self.region);
+        // Blocks have the same number of triangles in every pass, so they grow.
+        for i in 0.. {
+            let before = network.triangles.len();
+            let pass = Pass { shift: SHIFTS[i % 3], free_heights: false, done: [0.0, 1.0] };
+            network.improve(self.field, tolerance, pass, self.control)?;
+            if network.triangles.len() * 100 > before * 99 {
+                break;
+            }
+        }
+        Some(network)
+    }
+}

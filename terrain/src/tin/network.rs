@@ -1,0 +1,108 @@
+//! A whole network in quanta, and how far it lies from the samples.
+
+use super::Errors;
+use super::delaunay::Triangulation;
+use super::field::Field;
+use super::parallel;
+use super::region::Region;
+use super::scan::{Corner, Plane, farthest, rows};
+
+#[derive(Clone, Debug, Default)]
+pub(super) struct Network {
+    pub vertices: Vec<Corner>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Triangles measured by one thread at a time.
+const CHUNK: usize = 4096;
+
+impl Network {
+    /// The triangles of a triangulation that lie within the valid region, with the heights of their samples.
+    pub(super) fn of(mesh: &Triangulation, field: &Field) -> Self {
+        let within = (0..mesh.triangles() as u32).filter(|&t| !mesh.is_outside(t));
+        let mut network = Network {
+            // Vertices of none have no height; they go.
+            vertices: mesh.points.iter().map(|&(x, y)| Corner { x, y, z: field.at(x, y) }).collect(),
+            triangles: within.map(|t| mesh.corners(t)).collect(),
+        };
+        network.compact();
+        network
+    }
+
+    /// Every triangle of the grid in the valid region.
+    pub(super) fn full(field: &Field, region: &Region) -> Self {
+        let columns = field.columns as usize;
+        let vertices = (0..field.h.len())
+            .map(|i| Corner { x: (i % columns) as i32, y: (i / columns) as i32, z: field.h[i] })
+            .collect();
+        let triangles = region.grid_triangles();
+        let mut network = Network { vertices, triangles };
+        network.compact();
+        network
+    }
+
+    /// Drops vertices of no triangle; the others keep their order.
+    pub(super) fn compact(&mut self) {
+        let mut new = vec![u32::MAX; self.vertices.len()];
+        for &v in self.triangles.as_flattened() {
+            new[v as usize] = 0;
+        }
+        let mut count = 0;
+        for (v, new) in new.iter_mut().enumerate() {
+            if *new == 0 {
+                *new = count;
+                self.vertices[count as usize] = self.vertices[v];
+                count += 1;
+            }
+        }
+        self.vertices.truncate(count as usize);
+        for v in self.triangles.as_flattened_mut() {
+            *v = new[*v as usize];
+        }
+    }
+
+    /// The greatest distance of a sample, in the grid's units, without what rounding changed.
+    pub(super) fn greatest(&self, field: &Field) -> f64 {
+        let parts = parallel::map(self.triangles.chunks(CHUNK).collect(), |chunk: &[[u32; 3]]| {
+            let far = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(|v| self.vertices[v as usize]);
+                let far = farthest(field, a, b, c);
+                far.miss as f64 / far.area as f64
+            };
+            chunk.iter().map(far).fold(0.0, f64::max)
+        });
+        parts.into_iter().fold(0.0, f64::max) * field.quantum
+    }
+
+    /// How far the samples lie from the triangles, in the grid's units. Samples on sides count for every triangle that has them.
+    /// O(samples).
+    pub(super) fn errors(&self, field: &Field, heights: &[f64]) -> Errors {
+        let columns = field.columns as usize;
+        let parts = parallel::map(self.triangles.chunks(CHUNK).collect(), |chunk: &[[u32; 3]]| {
+            let (mut greatest, mut sum, mut count) = (0.0f64, 0.0, 0usize);
+            for t in chunk {
+                let [a, b, c] = t.map(|v| self.vertices[v as usize]);
+                let plane = Plane::new(a, b, c);
+                rows((a.x, a.y), (b.x, b.y), (c.x, c.y), |y, x0, x1| {
+                    let mut s = plane.at + plane.dx * i64::from(x0 - a.x) + plane.dy * i64::from(y - a.y);
+                    for x in x0..=x1 {
+                        let z = s as f64 / plane.area as f64 * field.quantum;
+                        let e = (z - heights[y as usize * columns + x as usize]).abs();
+                        greatest = greatest.max(e);
+                        sum += e * e;
+                        count += 1;
+                        s += plane.dx;
+                    }
+                });
+            }
+            (greatest, sum, count)
+        });
+        let (mut greatest, mut sum, mut count) = (0.0f64, 0.0, 0);
+        for (g, s, c) in parts {
+            greatest = greatest.max(g);
+            sum += s;
+            count += c;
+        }
+        Errors { max: greatest, rms: (sum / count.max(1) as f64).sqrt() }
+    }
+}

@@ -1,0 +1,185 @@
+//! The samples within a triangle, row by row, in integers.
+
+use super::field::{Field, Tolerance};
+
+/// A corner: column, row, height in quanta.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Corner {
+    pub x: i32,
+    pub y: i32,
+    pub z: i32,
+}
+
+/// Twice the area of a triangle in the plan; positive when it turns from the x axis (columns) to the y axis (rows).
+#[inline]
+pub(super) fn area(a: (i32, i32), b: (i32, i32), c: (i32, i32)) -> i64 {
+    let (ux, uy) = (i64::from(b.0 - a.0), i64::from(b.1 - a.1));
+    let (vx, vy) = (i64::from(c.0 - a.0), i64::from(c.1 - a.1));
+    ux * vy - uy * vx
+}
+
+/// Calls `f(y, x0, x1)` for every row of samples in the triangle, borders included. No division but one for each side.
+#[inline(always)]
+pub(super) fn rows(a: (i32, i32), b: (i32, i32), c: (i32, i32), mut f: impl FnMut(i32, i32, i32)) {
+    let mut v = [a, b, c];
+    if v[0].1 > v[1].1 {
+        v.swap(0, 1);
+    }
+    if v[1].1 > v[2].1 {
+        v.swap(1, 2);
+    }
+    if v[0].1 > v[1].1 {
+        v.swap(0, 1);
+    }
+    let [low, mid, high] = v;
+    if low.1 == high.1 {
+        return f(low.1, low.0.min(mid.0).min(high.0), low.0.max(mid.0).max(high.0));
+    }
+    let long_is_left = area(low, high, mid) <= 0;
+    let mut long = Side::new(low, high);
+    if low.1 < mid.1 {
+        let mut short = Side::new(low, mid);
+        for y in low.1..mid.1 {
+            let (l, r) = if long_is_left { (&long, &short) } else { (&short, &long) };
+            if l.ceil() <= r.floor() {
+                f(y, l.ceil(), r.floor());
+            }
+            long.step();
+            short.step();
+        }
+    }
+    if mid.1 == high.1 {
+        let (l, r) = (mid.0.min(high.0), mid.0.max(high.0));
+        return f(mid.1, l, r);
+    }
+    let mut short = Side::new(mid, high);
+    for y in mid.1..=high.1 {
+        let (l, r) = if long_is_left { (&long, &short) } else { (&short, &long) };
+        if l.ceil() <= r.floor() {
+            f(y, l.ceil(), r.floor());
+        }
+        long.step();
+        short.step();
+    }
+}
+
+/// Where a side crosses one row after the other: `whole + rest / rows`.
+struct Side {
+    whole: i32,
+    rest: i32,
+    rows: i32,
+    step_whole: i32,
+    step_rest: i32,
+}
+
+impl Side {
+    #[inline(always)]
+    fn new(from: (i32, i32), to: (i32, i32)) -> Self {
+        let (dx, rows) = (to.0 - from.0, to.1 - from.1);
+        // Most sides cross one row or a few: no division where none is needed.
+        let (step_whole, step_rest) = match rows {
+            1 => (dx, 0),
+            _ => (dx.div_euclid(rows), dx.rem_euclid(rows)),
+        };
+        Side { whole: from.0, rest: 0, rows, step_whole, step_rest }
+    }
+
+    #[inline(always)]
+    fn step(&mut self) {
+        self.whole += self.step_whole;
+        self.rest += self.step_rest;
+        if self.rest >= self.rows {
+            self.whole += 1;
+            self.rest -= self.rows;
+        }
+    }
+
+    #[inline(always)]
+    fn floor(&self) -> i32 {
+        self.whole
+    }
+
+    #[inline(always)]
+    fn ceil(&self) -> i32 {
+        self.whole + i32::from(self.rest > 0)
+    }
+}
+
+/// The plane of a triangle times its doubled area: `S(x, y) = at + dx (x - x0) + dy (y - y0)`, from its first corner.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane {
+    pub area: i64,
+    pub at: i64,
+    pub dx: i64,
+    pub dy: i64,
+}
+
+impl Plane {
+    #[inline(always)]
+    pub(super) fn new(a: Corner, b: Corner, c: Corner) -> Self {
+        let (ux, uy, uz) = (i64::from(b.x - a.x), i64::from(b.y - a.y), i64::from(b.z) - i64::from(a.z));
+        let (vx, vy, vz) = (i64::from(c.x - a.x), i64::from(c.y - a.y), i64::from(c.z) - i64::from(a.z));
+        let area = ux * vy - uy * vx;
+        Plane { area, at: area * i64::from(a.z), dx: uz * vy - vz * uy, dy: ux * vz - vx * uz }
+    }
+}
+
+/// The sample of a triangle that lies farthest from it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Farthest {
+    /// `|S - A h|`; 0 when every sample lies on the triangle.
+    pub miss: i64,
+    /// Index of the sample: the first of them.
+    pub sample: u32,
+    pub area: i64,
+}
+
+impl Farthest {
+    pub(super) fn within(&self, tolerance: Tolerance) -> bool {
+        self.miss <= tolerance.over(self.area)
+    }
+}
+
+/// Looks at every sample of a triangle that turns to the left and has no void sample.
+#[inline]
+pub(super) fn farthest(field: &Field, a: Corner, b: Corner, c: Corner) -> Farthest {
+    let plane = Plane::new(a, b, c);
+    let (mut miss, mut sample) = (0, 0u32);
+    let columns = field.columns as usize;
+    rows((a.x, a.y), (b.x, b.y), (c.x, c.y), |y, x0, x1| {
+        let mut s = plane.at + plane.dx * i64::from(x0 - a.x) + plane.dy * i64::from(y - a.y);
+        let first = y as usize * columns + x0 as usize;
+        let row = &field.h[first..=first + (x1 - x0) as usize];
+        for (i, &h) in row.iter().enumerate() {
+            let e = (s - plane.area * i64::from(h)).abs();
+            if e > miss {
+                miss = e;
+                sample = (first + i) as u32;
+            }
+            s += plane.dx;
+        }
+    });
+    Farthest { miss, sample, area: plane.area }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(300))]
+        /// Rows are the lattice points that three half planes hold.
+        #[test]
+        fn rows_hold_every_sample(p in proptest::array::uniform6(0..13i32)) {
+            let (a, b, c) = ((p[0], p[1]), (p[2], p[3]), (p[4], p[5]));
+            let (b, c) = if area(a, b, c) < 0 { (c, b) } else { (b, c) };
+            prop_assume!(area(a, b, c) != 0);
+            let mut seen = vec![];
+            rows(a, b, c, |y, x0, x1| seen.extend((x0..=x1).map(|x| (x, y))));
+            let inside = |p| area(a, b, p) >= 0 && area(b, c, p) >= 0 && area(c, a, p) >= 0;
+            let all: Vec<_> = (0..13).flat_map(|y| (0..13).map(move |x| (x, y))).filter(|&p| inside(p)).collect();
+            prop_assert_eq!(seen, all);
+        }
+    }
+}

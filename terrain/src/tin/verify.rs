@@ -1,0 +1,229 @@
+//! Checks a network against a grid. Slow and plain on purpose: it shares no code with what makes networks, so that both would have to be
+//! wrong in the same way.
+
+use super::Tin;
+use crate::Grid;
+
+/// What a network does to a grid's samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Verdict {
+    /// The greatest vertical distance of a valid sample from a triangle over or under it.
+    pub max_error: f64,
+    /// Valid samples farther than the error given; decided without rounding where `exact`.
+    pub beyond: usize,
+    /// Valid samples that no triangle has, but for isolated ones.
+    pub uncovered: usize,
+    /// Valid samples of no grid triangle with three valid corners.
+    pub isolated: usize,
+    /// Void samples strictly within a triangle.
+    pub over_void: usize,
+    /// Triangles that turn the wrong way.
+    pub turned: usize,
+    /// Triangles without an area in the plan, or with a corner outside of the grid or of no vertex.
+    pub flat: usize,
+    /// Twice the area of all triangles, less that of the valid region: 0 when they cover it once.
+    pub excess_area: i64,
+    /// Whether heights, samples and error fit 128-bit integers together; otherwise f64 decided.
+    pub exact: bool,
+}
+
+impl Verdict {
+    /// Whether nothing is wrong.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        let wrong = [self.beyond, self.uncovered, self.over_void, self.turned, self.flat];
+        wrong == [0; 5] && self.excess_area == 0
+    }
+}
+
+/// Whole multiples of a power of two.
+struct Fixed {
+    exponent: i32,
+}
+
+impl Fixed {
+    /// The greatest power of two that all values are multiples of; `None` if they take more than 88 bits.
+    fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let (mut least, mut greatest) = (i32::MAX, i32::MIN);
+        for v in values.filter(|&v| v != 0.0 && !v.is_nan()) {
+            let (mantissa, exponent) = parts(v);
+            least = least.min(exponent + mantissa.trailing_zeros() as i32);
+            greatest = greatest.max(exponent + 64 - mantissa.leading_zeros() as i32);
+        }
+        if least == i32::MAX {
+            return Some(Fixed { exponent: 0 });
+        }
+        // Weights take 34 bits beside.
+        (greatest - least <= 88).then_some(Fixed { exponent: least })
+    }
+
+    fn integer(&self, v: f64) -> i128 {
+        let (mantissa, exponent) = parts(v);
+        let shift = exponent - self.exponent;
+        let magnitude = i128::from(mantissa);
+        let magnitude = if mantissa == 0 {
+            0
+        } else if shift >= 0 {
+            magnitude << shift
+        } else {
+            magnitude >> -shift
+        };
+        if v < 0.0 { -magnitude } else { magnitude }
+    }
+}
+
+/// Mantissa and exponent of a finite number, without its sign.
+fn parts(v: f64) -> (u64, i32) {
+    let bits = v.to_bits();
+    let (exponent, fraction) = ((bits >> 52 & 0x7ff) as i32, bits & ((1 << 52) - 1));
+    if exponent == 0 { (fraction, -1074) } else { (fraction | 1 << 52, exponent - 1075) }
+}
+
+/// Looks at every sample within the bounds of every triangle. `error` in the grid's units; infinity only measures.
+///
+/// O(samples within the bounds of triangles), one thread.
+#[must_use]
+pub fn verify(grid: &Grid, tin: &Tin, error: f64) -> Verdict {
+    let bound = if error.is_finite() { error } else { 0.0 };
+    let all = grid.heights().iter().chain(&tin.heights).copied().chain([bound]);
+    let fixed = Fixed::of(all);
+    let mut verdict = Verdict { exact: fixed.is_some(), ..Verdict::default() };
+    let (columns, rows) = (grid.columns() as i64, grid.rows() as i64);
+    // 1: covered, 2: beyond the error, 4: a void within a triangle.
+    let mut marks = vec![0u8; grid.heights().len()];
+    let mut total = 0i64;
+    for t in &tin.triangles {
+        let corner = |v: u32| {
+            let [x, y] = tin.points.get(v as usize)?.map(i64::from);
+            let z = *tin.heights.get(v as usize)?;
+            (x < columns && y < rows && z.is_finite()).then_some((x, y, z))
+        };
+        let (Some(a), Some(b), Some(c)) = (corner(t[0]), corner(t[1]), corner(t[2])) else {
+            verdict.flat += 1;
+            continue;
+        };
+        let cross = |a: (i64, i64, f64), b: (i64, i64, f64), x: i64, y: i64| {
+            (b.0 - a.0) * (y - a.1) - (b.1 - a.1) * (x - a.0)
+        };
+        let area = cross(a, b, c.0, c.1);
+        total += area;
+        if area <= 0 {
+            if area < 0 {
+                verdict.turned += 1
+            } else {
+                verdict.flat += 1
+            }
+            continue;
+        }
+        for y in a.1.min(b.1).min(c.1)..=a.1.max(b.1).max(c.1) {
+            for x in a.0.min(b.0).min(c.0)..=a.0.max(b.0).max(c.0) {
+                let (u, v, w) = (cross(b, c, x, y), cross(c, a, x, y), cross(a, b, x, y));
+                if u < 0 || v < 0 || w < 0 {
+                    continue;
+                }
+                let i = (y * columns + x) as usize;
+                let h = grid.heights()[i];
+                if h.is_nan() {
+                    if u > 0 && v > 0 && w > 0 {
+                        marks[i] |= 4;
+                    }
+                    continue;
+                }
+                marks[i] |= 1;
+                let (miss, far) = match &fixed {
+                    Some(f) => {
+                        let weighted = |w: i64, z: f64| i128::from(w) * f.integer(z);
+                        let sum = weighted(u, a.2) + weighted(v, b.2) + weighted(w, c.2);
+                        let miss = (sum - weighted(area, h)).abs();
+                        let value = miss as f64 / area as f64 * 2f64.powi(f.exponent);
+                        (value, miss > weighted(area, bound))
+                    }
+                    None => {
+                        let z = (u as f64 * a.2 + v as f64 * b.2 + w as f64 * c.2) / area as f64;
+                        ((z - h).abs(), (z - h).abs() > bound)
+                    }
+                };
+                verdict.max_error = verdict.max_error.max(miss);
+                if far && error.is_finite() {
+                    marks[i] |= 2;
+                }
+            }
+        }
+    }
+    let (mut expected, mut used) = (0, vec![false; marks.len()]);
+    for y in 0..rows - 1 {
+        for x in 0..columns - 1 {
+            let i = (y * columns + x) as usize;
+            let (right, up, both) = (i + 1, i + columns as usize, i + columns as usize + 1);
+            for grid_triangle in [[i, right, both], [i, both, up]] {
+                if grid_triangle.iter().all(|&s| !grid.heights()[s].is_nan()) {
+                    expected += 1;
+                    grid_triangle.iter().for_each(|&s| used[s] = true);
+                }
+            }
+        }
+    }
+    verdict.excess_area = total - expected;
+    for (i, &mark) in marks.iter().enumerate() {
+        let valid = !grid.heights()[i].is_nan();
+        verdict.isolated += usize::from(valid && !used[i]);
+        verdict.uncovered += usize::from(used[i] && mark & 1 == 0);
+        verdict.beyond += usize::from(mark & 2 != 0);
+        verdict.over_void += usize::from(mark & 4 != 0);
+    }
+    verdict
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flat_square() -> (Grid, Tin) {
+        let grid = Grid::new(3, 3, vec![0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0]).unwrap();
+        let tin = Tin {
+            points: vec![[0, 0], [2, 0], [2, 2], [0, 2]],
+            heights: vec![0.0; 4],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        (grid, tin)
+    }
+
+    #[test]
+    fn the_greatest_error_is_found_and_the_bound_is_exact() {
+        let (grid, tin) = flat_square();
+        let verdict = verify(&grid, &tin, 0.3);
+        assert!(verdict.is_good() && verdict.exact, "{verdict:?}");
+        assert_eq!(verdict.max_error, 0.3);
+        assert_eq!(verify(&grid, &tin, 0.3f64.next_down()).beyond, 1);
+    }
+
+    #[test]
+    fn what_is_wrong_is_counted() {
+        let (grid, mut tin) = flat_square();
+        tin.triangles[1] = [0, 3, 2];
+        let verdict = verify(&grid, &tin, 1.0);
+        assert_eq!((verdict.turned, verdict.uncovered, verdict.excess_area), (1, 3, -8));
+        tin.triangles[1] = [0, 2, 2];
+        assert_eq!(verify(&grid, &tin, 1.0).flat, 1);
+        tin.triangles[1] = [0, 2, 9];
+        assert_eq!(verify(&grid, &tin, 1.0).flat, 1);
+    }
+
+    #[test]
+    fn voids_and_what_they_isolate() {
+        let (_, tin) = flat_square();
+        let mut heights = vec![0.0; 9];
+        (heights[1], heights[3]) = (f64::NAN, f64::NAN);
+        let grid = Grid::new(3, 3, heights).unwrap();
+        let verdict = verify(&grid, &tin, 1.0);
+        assert_eq!((verdict.isolated, verdict.over_void), (3, 0));
+        assert!(!verdict.is_good());
+        let mut heights = vec![0.0; 25];
+        heights[6 + 2] = f64::NAN;
+        let grid = Grid::new(5, 5, heights).unwrap();
+        let points = vec![[0, 0], [4, 0], [4, 4], [0, 4]];
+        let tin = Tin { points, heights: vec![0.0; 4], ..flat_square().1 };
+        assert_eq!(verify(&grid, &tin, 1.0).over_void, 1);
+    }
+}

@@ -1,0 +1,164 @@
+//! Networks of small grids, checked by code that shares nothing with what makes them.
+
+use progmesh_terrain::Grid;
+use progmesh_terrain::tin::{Made, Method, Options, Quiet, TinError, triangulate, verify};
+use proptest::prelude::*;
+
+const METHODS: [Method; 4] = [Method::Regular, Method::Greedy, Method::Decimation, Method::Best];
+
+fn make(grid: &Grid, options: &Options) -> Made {
+    let made = triangulate(grid, options, &Quiet).unwrap();
+    let verdict = verify(grid, &made.tin, options.max_error.unwrap_or(f64::INFINITY));
+    assert!(verdict.is_good() && verdict.exact, "{options:?}: {verdict:?}");
+    assert!((verdict.max_error - made.errors.max).abs() <= 1e-9 * verdict.max_error.max(1.0));
+    assert_eq!(verdict.isolated, made.isolated);
+    assert!(made.tin.heights.iter().all(|&h| f64::from(h as f32) == h));
+    assert!(made.tin.triangles.len() <= made.grid_triangles);
+    made
+}
+
+/// A rough surface: octaves of sines, and a bump.
+fn rough(columns: usize, rows: usize) -> Grid {
+    let height = |i: usize| {
+        let (x, y) = ((i % columns) as f64, (i / columns) as f64);
+        let octaves: f64 = (0..5)
+            .map(|k| {
+                let f = 0.05 * 2f64.powi(k);
+                (f * x + 0.7 * f64::from(k)).sin() * (1.3 * f * y).cos() / f
+            })
+            .sum();
+        octaves * 4.0 + 100.0 * (-((x - 20.0).powi(2) + (y - 30.0).powi(2)) / 60.0).exp()
+    };
+    Grid::new(columns, rows, (0..columns * rows).map(height).collect()).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Any heights, any voids: covered exactly once, within the error, by every method.
+    #[test]
+    fn every_method_keeps_the_error(
+        columns in 2..14usize,
+        rows in 2..14usize,
+        heights in proptest::collection::vec(-30..30i32, 196),
+        void in proptest::collection::vec(0..100u32, 196),
+        share in prop_oneof![Just(0u32), Just(8), Just(35)],
+        tenths in prop_oneof![Just(0u32), 1..300u32],
+    ) {
+        let height = |i: usize| if void[i] < share { f64::NAN } else { f64::from(heights[i]) / 10.0 };
+        let grid = Grid::new(columns, rows, (0..columns * rows).map(height).collect()).unwrap();
+        // Tenths are no multiples of a quantum: what rounding takes must be left.
+        let error = f64::from(tenths) / 10.0 + 1e-3;
+        for method in METHODS {
+            for on_samples in [false, true] {
+                let options =
+                    Options::default().with_max_error(error).with_method(method).with_on_samples(on_samples);
+                match triangulate(&grid, &options, &Quiet) {
+                    Ok(_) => drop(make(&grid, &options)),
+                    Err(e) => prop_assert_eq!(e, TinError::Nothing),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_best_takes_far_fewer_triangles_than_greedy_insertion() {
+    let grid = rough(160, 120);
+    for error in [8.0, 2.0] {
+        let options = Options::default().with_max_error(error);
+        let greedy = make(&grid, &options.clone().with_method(Method::Greedy)).tin.triangles.len();
+        let best = make(&grid, &options).tin.triangles.len();
+        let on_samples = make(&grid, &options.with_on_samples(true)).tin.triangles.len();
+        assert!(best * 100 <= greedy * 65, "{error}: {best} of {greedy}");
+        assert!(on_samples * 100 <= greedy * 75, "{error}: {on_samples} of {greedy}");
+    }
+}
+
+#[test]
+fn vertices_on_samples_have_their_heights() {
+    let heights = rough(60, 40).heights().iter().map(|h| h.round()).collect();
+    let grid = Grid::new(60, 40, heights).unwrap();
+    let made = make(&grid, &Options::default().with_max_error(3.0).with_on_samples(true));
+    for (p, &h) in made.tin.points.iter().zip(&made.tin.heights) {
+        assert_eq!(grid.height(p[0] as usize, p[1] as usize), Some(h));
+    }
+}
+
+#[test]
+fn a_plane_is_two_triangles_and_a_ridge_few() {
+    let plane =
+        Grid::new(40, 30, (0..1200).map(|i| (i % 40) as f64 * 0.5 - (i / 40) as f64).collect()).unwrap();
+    for method in [Method::Greedy, Method::Decimation, Method::Best] {
+        let made = make(&plane, &Options::default().with_max_error(0.0).with_method(method));
+        assert_eq!((made.tin.triangles.len(), made.errors.max), (2, 0.0), "{method:?}");
+    }
+    let ridge = Grid::new(41, 30, (0..1230i32).map(|i| f64::from((i % 41 - 20).abs())).collect()).unwrap();
+    let made = make(&ridge, &Options::default().with_max_error(0.0));
+    assert_eq!(made.tin.triangles.len(), 4);
+}
+
+#[test]
+fn an_outline_loses_no_point_and_gains_none() {
+    // A round lake, a bay at the border, and an island of one cell.
+    let void = |x: i32, y: i32| {
+        (x - 20).pow(2) + (y - 18).pow(2) < 60 && !(20..22).contains(&x) || x > 33 && (8..14).contains(&y)
+    };
+    let height = |i: i32| if void(i % 40, i / 40) { f64::NAN } else { f64::from(i % 40) };
+    let grid = Grid::new(40, 36, (0..1440).map(height).collect()).unwrap();
+    for method in METHODS {
+        let made = make(&grid, &Options::default().with_max_error(5.0).with_method(method));
+        assert!(made.tin.triangles.len() < 120 || method == Method::Regular, "{method:?}");
+    }
+}
+
+#[test]
+fn a_count_of_triangles_ends_the_work() {
+    let grid = rough(80, 80);
+    for method in METHODS {
+        for most in [60, 800] {
+            let made = make(&grid, &Options::default().with_triangles(most).with_method(method));
+            let n = made.tin.triangles.len();
+            assert!(n <= most, "{method:?}: {n} of {most}");
+            assert!(n * 10 >= most * 7 || method == Method::Regular, "{method:?}: {n} of {most}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_is_said() {
+    let all = |z: f64| Grid::new(3, 3, vec![z; 9]).unwrap();
+    let options = Options::default().with_max_error(1.0);
+    let fails = |grid: &Grid, options: &Options| triangulate(grid, options, &Quiet).unwrap_err();
+    assert_eq!(fails(&all(f64::NAN), &options), TinError::Nothing);
+    assert_eq!(fails(&Grid::new(9, 1, vec![0.0; 9]).unwrap(), &options), TinError::Nothing);
+    assert_eq!(fails(&Grid::new(0, 0, vec![]).unwrap(), &options), TinError::Nothing);
+    assert_eq!(fails(&all(0.0), &Options::default().with_max_error(f64::NAN)), TinError::BadError);
+    assert_eq!(fails(&all(0.0), &Options::default().with_max_error(-1.0)), TinError::BadError);
+    let mut spike = vec![0.1; 9];
+    spike[4] = 1e30;
+    let spike = Grid::new(3, 3, spike).unwrap();
+    assert!(matches!(fails(&spike, &options), TinError::TooFine { greatest, .. } if greatest == 1e30));
+    assert!(matches!(fails(&all(1e30), &options), TinError::TooFine { .. }));
+    assert_eq!(make(&all(1e30), &Options::default().with_max_error(1e24)).tin.triangles.len(), 2);
+    // 1e30 and 0.1 together take more bits than the exact check has.
+    let made = triangulate(&spike, &Options::default().with_max_error(1e29), &Quiet).unwrap();
+    let verdict = verify(&spike, &made.tin, 1e29);
+    assert!(verdict.is_good() && !verdict.exact, "{verdict:?}");
+}
+
+#[test]
+fn work_can_be_stopped() {
+    struct Stop;
+    impl progmesh_terrain::tin::Control for Stop {
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    for method in METHODS {
+        let options = Options::default().with_max_error(1.0).with_method(method);
+        let stopped = triangulate(&rough(100, 100), &options, &Stop).err();
+        // Greedy insertion may be done before it looks.
+        assert!(stopped == Some(TinError::Cancelled) || method == Method::Greedy, "{method:?}");
+    }
+}
