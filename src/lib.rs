@@ -11,6 +11,7 @@ pub use progmesh_simplify as simplify;
 pub use progmesh_terrain as terrain;
 
 pub mod compare;
+pub mod ground;
 pub mod io;
 pub mod levels;
 pub mod normals;

@@ -163,7 +163,20 @@ impl Output {
         interrupt: &Interrupt,
         warnings: &mut Warnings,
     ) -> Result<(), Failure> {
-        let options: EncodeOptions = files::encode_options(&self.output, self.text);
+        self.write_with_facts(format, scene, vec![], interrupt, warnings)
+    }
+
+    /// The same, with facts about the content where the format has a place for them.
+    pub(crate) fn write_with_facts(
+        &self,
+        format: Format,
+        scene: &Scene,
+        facts: Vec<(String, serde_json::Value)>,
+        interrupt: &Interrupt,
+        warnings: &mut Warnings,
+    ) -> Result<(), Failure> {
+        let mut options: EncodeOptions = files::encode_options(&self.output, self.text);
+        options.facts = facts;
         common::write(&self.output, format, &options, scene, interrupt, warnings)
     }
 }

@@ -69,7 +69,6 @@ fn sample_type(text: &str) -> Result<(SampleType, ByteOrder), String> {
 }
 
 /// The most samples that are held at once: 8 GiB.
-#[allow(dead_code)]
 const MOST_SAMPLES: usize = 1 << 30;
 
 impl GridInput {
@@ -122,7 +121,6 @@ pub(crate) fn unread(e: RasterError) -> Failure {
 }
 
 /// All heights of a grid at once.
-#[allow(dead_code)] // for the subcommands that triangulate
 pub(crate) fn whole(name: &str, grid: &GridFile) -> Result<Grid, Failure> {
     grid.raster.whole(MOST_SAMPLES).map_err(|e| match e {
         RasterError::TooMany { columns, rows, limit } => Failure::Input(format!(

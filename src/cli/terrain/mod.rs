@@ -2,10 +2,11 @@
 
 mod info;
 pub(crate) mod input;
+mod tin;
 
 use super::Failure;
 
-/// Height grids: say what they hold.
+/// Height grids: say what they hold, make triangles of them.
 ///
 /// Grids are GeoTIFF, HGT, ESRI ASCII, PNG (grey, Terrain-RGB or Terrarium) or raw samples.
 #[derive(clap::Args, Debug)]
@@ -17,12 +18,14 @@ pub(crate) struct Args {
 #[derive(clap::Subcommand, Debug)]
 enum Command {
     Info(info::Args),
+    Tin(Box<tin::Args>),
 }
 
 impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         match self.command {
             Command::Info(args) => args.run(),
+            Command::Tin(args) => args.run(),
         }
     }
 }

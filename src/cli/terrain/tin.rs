@@ -1,0 +1,482 @@
+//! `progmesh terrain tin GRID OUT`.
+
+use super::input::{GridInput, whole};
+use crate::cli::Failure;
+use crate::cli::args::{self, Output};
+use crate::cli::common::{self, Warnings, short, thousands};
+use crate::cli::control::{Interrupt, Progress};
+use crate::cli::picture::PictureArgs;
+use clap::ValueEnum;
+use progmesh::ground::{self, Space};
+use progmesh::io::Format;
+use progmesh::io::grid::GridFile;
+use progmesh::simplify::Control;
+use progmesh::terrain::Grid;
+use progmesh::terrain::tin::{self, Made, Method, Options, TinError, Verdict};
+use serde::Serialize;
+use serde_json::json;
+use std::time::Instant;
+
+/// Make few triangles of a height grid, none of its samples farther from them than an error.
+///
+/// The error is vertical, in the grid's units, and holds exactly for the coordinates as they are written: every valid sample is looked at, in
+/// integers. Voids stay open: the surface is that of the grid triangles of three valid samples, with the same outline. Vertices lie at
+/// samples; their heights are free within the error, unless --on-samples keeps them.
+#[derive(clap::Args, Debug)]
+#[command(after_help = "\
+Examples:
+  progmesh terrain tin alps.tif alps.ply --max-error 5
+  progmesh terrain tin N57E011.hgt coast.glb --max-error 10 --exaggeration 2 --png coast.png
+  progmesh terrain tin alps.tif alps.obj --triangles 50000 --json
+  progmesh terrain tin alps.tif alps.ply --max-error 5 --method greedy --verify
+  progmesh terrain tin dem.raw dem.stl --size 1025x1025 --type u16 --max-error 3 --on-samples
+
+Exit code 1 means: done and written, but the outline takes more triangles than asked for, or --verify found a fault.")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    input: GridInput,
+    #[command(flatten)]
+    output: Output,
+
+    /// The farthest that a sample may lie above or below the surface, in the grid's units
+    #[arg(long, value_name = "E", value_parser = args::not_negative, allow_negative_numbers = true,
+          required_unless_present = "triangles", help_heading = "Target")]
+    max_error: Option<f64>,
+    /// At most this many triangles, with about the least error; with --max-error, where that would take more
+    #[arg(long, value_name = "N", value_parser = args::positive, allow_negative_numbers = true,
+          help_heading = "Target")]
+    triangles: Option<usize>,
+    /// How to make them
+    #[arg(long, value_enum, default_value_t = MethodName::Best, help_heading = "Method")]
+    method: MethodName,
+    /// best: keep vertices at the heights of their samples, as the other methods do
+    #[arg(long, help_heading = "Method")]
+    on_samples: bool,
+    /// Check the result by separate, plain code: error, coverage, voids, orientation
+    #[arg(long, help_heading = "Method")]
+    verify: bool,
+
+    /// Where vertices stand [default: world for GLB and glTF, grid otherwise]
+    #[arg(long, value_enum, help_heading = "Space")]
+    space: Option<SpaceName>,
+    /// world: lengths of a step by a column and by a row [default: the grid's, in metres; 1,1 if unknown]
+    #[arg(long, value_name = "X,Y", value_parser = spacing, allow_negative_numbers = true, help_heading = "Space")]
+    spacing: Option<[f64; 2]>,
+    /// world: multiply heights by this [default: 1]
+    #[arg(long, value_name = "F", value_parser = factor, allow_negative_numbers = true, help_heading = "Space")]
+    exaggeration: Option<f64>,
+
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// Threads to use; the result does not depend on it [default: all]
+    #[arg(long, value_name = "N", value_parser = args::threads, allow_negative_numbers = true)]
+    threads: Option<usize>,
+    /// Print one JSON object about the run on standard output (see docs/json.md)
+    #[arg(long)]
+    json: bool,
+    /// Say nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    /// Greedy insertion, then heights moved, sides swapped, vertices taken away
+    Best,
+    /// Delaunay, the farthest sample next (Garland & Heckbert): as hmm and Delatin
+    Greedy,
+    /// Vertices taken from the full grid, cheapest first: slow
+    Decimation,
+    /// Every k-th row and column
+    Regular,
+}
+
+impl MethodName {
+    fn method(self) -> Method {
+        match self {
+            MethodName::Best => Method::Best,
+            MethodName::Greedy => Method::Greedy,
+            MethodName::Decimation => Method::Decimation,
+            MethodName::Regular => Method::Regular,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            MethodName::Best => "best",
+            MethodName::Greedy => "greedy",
+            MethodName::Decimation => "decimation",
+            MethodName::Regular => "regular",
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SpaceName {
+    /// x = column, y = row, z = height
+    Grid,
+    /// Metres, y up, the middle of the grid at the origin
+    World,
+}
+
+/// `30,30.5`.
+fn spacing(text: &str) -> Result<[f64; 2], String> {
+    let (x, y) = text.split_once(',').unwrap_or((text, text));
+    Ok([factor(x)?, factor(y)?])
+}
+
+/// A finite number above 0.
+fn factor(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("must be a number above 0".into()),
+    }
+}
+
+/// The height range is at most this part of the longer side in a picture of a grid whose spacing nobody knows.
+const PICTURE_RELIEF: f64 = 0.12;
+
+impl Args {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let start = Instant::now();
+        self.output.leave_room_for(self.json)?;
+        let mut warnings = Warnings::new(self.quiet);
+        let format = self.output.format(&mut warnings)?;
+        let mut drawing = self.picture.drawing()?;
+        let interrupt = Interrupt::watch();
+        let file = self.input.name();
+        let report = common::in_pool(self.threads, || {
+            let source = self.input.open(&mut warnings)?;
+            let space = self.space(format, &source, &mut warnings)?;
+            let grid = whole(&file, &source)?;
+            let read = start.elapsed().as_secs_f64();
+            interrupt.be_graceful();
+            let making = Instant::now();
+            let progress = Progress::new(&interrupt, self.quiet, "triangulating");
+            let made = tin::triangulate(&grid, &self.options(), &Watch(&progress))
+                .map_err(|e| failure(&file, &e))?;
+            drop(progress);
+            let make = making.elapsed().as_secs_f64();
+            warnings.say(isolated(&made).map(|w| format!("{file}: {w}")));
+            let verifying = Instant::now();
+            let verdict =
+                self.verify.then(|| tin::verify(&grid, &made.tin, self.max_error.unwrap_or(f64::INFINITY)));
+            let verify = verifying.elapsed().as_secs_f64();
+            if interrupt.is_set() {
+                return Err(Failure::Interrupted);
+            }
+            let writing = Instant::now();
+            let scene = ground::scene(&made.tin, &grid, space, "terrain");
+            let facts = facts(&source, &grid, space, &made);
+            self.output.write_with_facts(format, &scene, facts, &interrupt, &mut warnings)?;
+            let write = writing.elapsed().as_secs_f64();
+            if let Some(d) = &mut drawing {
+                let shown = ground::scene(&made.tin, &grid, picture_space(&source, &grid, space), "terrain");
+                d.add(&shown).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+                d.write()?;
+            }
+            let draw = drawing.as_ref().map_or(0.0, |d| d.seconds);
+            let total = start.elapsed().as_secs_f64();
+            let seconds = Seconds { read, make, verify, write, draw, total };
+            Ok(self.report(&file, &grid, space, &made, verdict.as_ref(), seconds))
+        })?;
+        let report = Report { warnings: warnings.all, ..report };
+        if !self.quiet {
+            common::note(&report.text());
+        }
+        if self.json {
+            common::print_json(&report)?;
+        }
+        self.judge(&report)
+    }
+
+    fn options(&self) -> Options {
+        let mut options =
+            Options::default().with_method(self.method.method()).with_on_samples(self.on_samples);
+        (options.max_error, options.triangles) = (self.max_error, self.triangles);
+        options
+    }
+
+    /// Where vertices stand.
+    fn space(&self, format: Format, source: &GridFile, warnings: &mut Warnings) -> Result<Space, Failure> {
+        let usual = match format {
+            Format::Glb | Format::Gltf => SpaceName::World,
+            _ => SpaceName::Grid,
+        };
+        if self.space.unwrap_or(usual) == SpaceName::Grid {
+            if self.spacing.is_some() || self.exaggeration.is_some() {
+                return Err(Failure::Usage(
+                    "--spacing and --exaggeration are for --space world; in grid space x is the column, y the row, z the height"
+                        .into(),
+                ));
+            }
+            return Ok(Space::Grid);
+        }
+        let spacing = match self.spacing.or_else(|| known_spacing(source)) {
+            Some(spacing) => spacing,
+            None => {
+                let unknown = "the lengths of its steps are not known: 1 by 1 was taken; --spacing says them";
+                warnings.say([format!("{}: {unknown}", self.input.name())]);
+                [1.0, 1.0]
+            }
+        };
+        Ok(Space::World { spacing, exaggeration: self.exaggeration.unwrap_or(1.0) })
+    }
+
+    fn report(
+        &self,
+        file: &str,
+        grid: &Grid,
+        space: Space,
+        made: &Made,
+        verdict: Option<&Verdict>,
+        seconds: Seconds,
+    ) -> Report {
+        let (space, spacing, exaggeration) = match space {
+            Space::Grid => ("grid", None, None),
+            Space::World { spacing, exaggeration } => ("world", Some(spacing), Some(exaggeration)),
+        };
+        Report {
+            command: "terrain tin",
+            file: file.into(),
+            columns: grid.columns(),
+            rows: grid.rows(),
+            valid: made.valid,
+            isolated: made.isolated,
+            grid_triangles: made.grid_triangles,
+            method: self.method.name(),
+            on_samples: self.on_samples || self.method != MethodName::Best,
+            max_error: self.max_error,
+            max_triangles: self.triangles,
+            triangles: made.tin.triangles.len(),
+            vertices: made.tin.points.len(),
+            error: ErrorReport { max: made.errors.max, rms: made.errors.rms },
+            step: made.step,
+            verified: verdict.map(Verified::of),
+            space,
+            spacing,
+            exaggeration,
+            seconds,
+            warnings: vec![],
+        }
+    }
+
+    /// Whether all that was asked for was done.
+    fn judge(&self, report: &Report) -> Result<(), Failure> {
+        if report.verified.as_ref().is_some_and(|v| !v.good) {
+            return Err(Failure::Missed(format!("{}: the check found a fault; this is a bug", report.file)));
+        }
+        match self.triangles {
+            Some(most) if report.triangles > most => Err(Failure::Missed(format!(
+                "{}: the outline alone takes {} triangles, more than the {} asked for",
+                report.file,
+                thousands(report.triangles),
+                thousands(most)
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Lengths of a step in metres, or in whatever unit the grid has.
+fn known_spacing(source: &GridFile) -> Option<[f64; 2]> {
+    let place = &source.georeference;
+    place.spacing_metres(source.raster.columns(), source.raster.rows()).or_else(|| place.spacing())
+}
+
+/// How a picture shows it: with y up, and heights that show where no spacing is known.
+fn picture_space(source: &GridFile, grid: &Grid, space: Space) -> Space {
+    if let Space::World { .. } = space {
+        return space;
+    }
+    if let Some(spacing) = known_spacing(source) {
+        return Space::World { spacing, exaggeration: 1.0 };
+    }
+    let side = grid.columns().max(grid.rows()) as f64;
+    let range = grid.range().map_or(0.0, |(least, greatest)| greatest - least);
+    let exaggeration = if range > 0.0 { (PICTURE_RELIEF * side / range).max(f64::MIN_POSITIVE) } else { 1.0 };
+    Space::World { spacing: [1.0, 1.0], exaggeration }
+}
+
+fn isolated(made: &Made) -> Option<String> {
+    (made.isolated > 0).then(|| {
+        format!(
+            "{} valid samples have no two valid neighbours to make a triangle with: left out",
+            thousands(made.isolated)
+        )
+    })
+}
+
+/// What a file says about where it lies.
+fn facts(source: &GridFile, grid: &Grid, space: Space, made: &Made) -> Vec<(String, serde_json::Value)> {
+    let mut facts = vec![("terrain_error".to_string(), json!(made.errors.max))];
+    let place = &source.georeference;
+    if let Space::World { spacing, exaggeration } = space {
+        facts.push(("terrain_spacing".into(), json!(spacing)));
+        facts.push(("terrain_exaggeration".into(), json!(exaggeration)));
+        // The model coordinates, in the grid's own system, of the scene's origin.
+        if let Some(origin) = place.transform.map(|t| t.apply(ground::middle(grid))) {
+            facts.push(("terrain_origin".into(), json!(origin)));
+        }
+    }
+    if let Some(crs) = &place.crs {
+        if let Some(epsg) = crs.epsg {
+            facts.push(("terrain_crs".into(), json!(format!("EPSG:{epsg}"))));
+        } else if let Some(name) = &crs.name {
+            facts.push(("terrain_crs".into(), json!(name)));
+        }
+    }
+    facts
+}
+
+fn failure(file: &str, e: &TinError) -> Failure {
+    match e {
+        TinError::Cancelled => Failure::Interrupted,
+        TinError::TooFine { .. } => Failure::Input(format!("{file}: {e} (--nodata)")),
+        e => Failure::Input(format!("{file}: {e}")),
+    }
+}
+
+/// The progress bar, as `terrain` knows one.
+struct Watch<'a>(&'a Progress<'a>);
+
+impl tin::Control for Watch<'_> {
+    fn progress(&self, done: f64) {
+        self.0.progress(done);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}
+
+/// The schema of `terrain tin --json`; docs/json.md says what each field means.
+#[derive(Serialize)]
+struct Report {
+    command: &'static str,
+    file: String,
+    columns: usize,
+    rows: usize,
+    valid: usize,
+    isolated: usize,
+    grid_triangles: usize,
+    method: &'static str,
+    on_samples: bool,
+    max_error: Option<f64>,
+    max_triangles: Option<usize>,
+    triangles: usize,
+    vertices: usize,
+    error: ErrorReport,
+    step: Option<usize>,
+    verified: Option<Verified>,
+    space: &'static str,
+    spacing: Option<[f64; 2]>,
+    exaggeration: Option<f64>,
+    seconds: Seconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct ErrorReport {
+    max: f64,
+    rms: f64,
+}
+
+#[derive(Serialize)]
+struct Verified {
+    good: bool,
+    exact: bool,
+    max: f64,
+    beyond: usize,
+    uncovered: usize,
+    over_void: usize,
+    turned: usize,
+    flat: usize,
+    excess_area: i64,
+}
+
+impl Verified {
+    fn of(v: &Verdict) -> Self {
+        Verified {
+            good: v.is_good(),
+            exact: v.exact,
+            max: v.max_error,
+            beyond: v.beyond,
+            uncovered: v.uncovered,
+            over_void: v.over_void,
+            turned: v.turned,
+            flat: v.flat,
+            excess_area: v.excess_area,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Seconds {
+    read: f64,
+    make: f64,
+    verify: f64,
+    write: f64,
+    draw: f64,
+    total: f64,
+}
+
+impl Report {
+    fn text(&self) -> String {
+        let t = &self.seconds;
+        let step = self.step.map_or(String::new(), |k| format!(", every {}", ordinal(k)));
+        let verified = match &self.verified {
+            Some(v) if v.good => "; verified",
+            Some(_) => "; NOT as it should be",
+            None => "",
+        };
+        format!(
+            "{}: {} x {} samples -> {} triangles, error {} (rms {}){verified}; {}{step}, {:.3} s (read {:.3}, make {:.3}, write {:.3})",
+            self.file,
+            thousands(self.columns),
+            thousands(self.rows),
+            thousands(self.triangles),
+            short(self.error.max),
+            short(self.error.rms),
+            self.method,
+            t.total,
+            t.read,
+            t.make,
+            t.write
+        )
+    }
+}
+
+/// `4th`.
+fn ordinal(n: usize) -> String {
+    let ending = match (n % 100, n % 10) {
+        (11..=13, _) => "th",
+        (_, 1) => "st",
+        (_, 2) => "nd",
+        (_, 3) => "rd",
+        _ => "th",
+    };
+    format!("{n}{ending}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spacings_are_one_number_or_two() {
+        assert_eq!(spacing("30"), Ok([30.0, 30.0]));
+        assert_eq!(spacing("30, 20.5"), Ok([30.0, 20.5]));
+        for bad in ["", "0", "1,-1", "nan", "1,2,3", "inf"] {
+            assert!(spacing(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn ordinals_are_english() {
+        assert_eq!(
+            [1, 2, 3, 4, 11, 22, 113].map(ordinal),
+            ["1st", "2nd", "3rd", "4th", "11th", "22nd", "113th"]
+        );
+    }
+}

@@ -1,0 +1,139 @@
+//! `progmesh terrain tin`, end to end.
+
+mod common;
+
+use common::Place;
+use serde_json::Value;
+
+/// Heights of a hilly raster of 48 x 40 samples, i16, with a lake of voids (-32768) unless told otherwise.
+fn hills(lake: bool) -> Vec<u8> {
+    let height = |i: i32| {
+        let (x, y) = (f64::from(i % 48), f64::from(i / 48));
+        let hill = 300.0 * (-((x - 14.0).powi(2) + (y - 22.0).powi(2)) / 90.0).exp();
+        let waves = 25.0 * (x * 0.45).sin() * (y * 0.31).cos() + 4.0 * (x * 1.9 + y).sin();
+        let void = lake && (x - 34.0).hypot(y - 12.0) < 6.0;
+        if void { i16::MIN } else { (hill + waves) as i16 }
+    };
+    (0..48 * 40).flat_map(|i| height(i).to_le_bytes()).collect()
+}
+
+const RAW: &str = "--size 48x40 --type i16 --nodata -32768";
+
+fn place() -> Place {
+    let p = Place::new();
+    p.write("hills.raw", hills(true));
+    p
+}
+
+fn tin(p: &Place, arguments: &str) -> Value {
+    p.done(&format!("terrain tin hills.raw {arguments} {RAW} --verify --json -q")).json()
+}
+
+#[test]
+fn every_method_keeps_the_error_and_the_check_agrees() {
+    let p = place();
+    let mut counts = vec![];
+    for method in ["best", "greedy", "decimation", "regular"] {
+        let report = tin(&p, &format!("{method}.ply --max-error 6 --method {method}"));
+        assert_eq!(report["verified"]["good"], true, "{report}");
+        assert_eq!(report["verified"]["exact"], true);
+        assert!(report["error"]["max"].as_f64().unwrap() <= 6.0);
+        let triangles = report["triangles"].as_u64().unwrap();
+        assert_eq!(p.info(&format!("{method}.ply"))["meshes"][0]["faces"], triangles);
+        counts.push(triangles);
+    }
+    assert!(counts[0] * 10 < counts[1] * 7, "{counts:?}");
+    let kept = tin(&p, "kept.ply --max-error 6 --on-samples");
+    assert_eq!((&kept["on_samples"], &kept["verified"]["good"]), (&true.into(), &true.into()));
+}
+
+#[test]
+fn a_count_is_kept_and_an_outline_that_needs_more_is_said() {
+    let p = place();
+    let report = tin(&p, "few.ply --triangles 200");
+    let triangles = report["triangles"].as_u64().unwrap();
+    assert!((150..=200).contains(&triangles), "{triangles}");
+    p.run(&format!("terrain tin hills.raw few.ply --triangles 3 {RAW}")).failed(1, "the outline alone takes");
+    assert!(p.exists("few.ply"));
+}
+
+#[test]
+fn grid_space_is_columns_rows_and_heights() {
+    let p = Place::new();
+    p.write("hills.raw", hills(false));
+    let report = tin(&p, "out.obj --max-error 20");
+    assert_eq!((&report["space"], &report["spacing"]), (&"grid".into(), &Value::Null));
+    let text = p.text("out.obj");
+    for corner in ["v 0 0 ", "v 47 0 ", "v 0 39 ", "v 47 39 "] {
+        assert!(text.lines().any(|l| l.starts_with(corner)), "{corner}");
+    }
+    p.run(&format!("terrain tin hills.raw o.ply --max-error 9 --spacing 2 {RAW}")).failed(2, "--space world");
+}
+
+#[test]
+fn a_glb_is_in_metres_with_y_up_and_the_normals_of_the_grid() {
+    let p = place();
+    let report = tin(&p, "out.glb --max-error 6 --spacing 30,20 --exaggeration 2");
+    assert_eq!(report["space"], "world");
+    assert_eq!(report["spacing"], serde_json::json!([30.0, 20.0]));
+    let document = gltf::Gltf::open(p.path("out.glb")).unwrap();
+    let blob = document.blob.clone().unwrap();
+    let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
+    let reader = primitive.reader(|_| Some(&blob));
+    let positions: Vec<[f32; 3]> = reader.read_positions().unwrap().collect();
+    let normals: Vec<[f32; 3]> = reader.read_normals().unwrap().collect();
+    assert_eq!(positions.len(), normals.len());
+    assert!(normals.iter().all(|n| n[1] > 0.0 && (n.iter().map(|c| c * c).sum::<f32>() - 1.0).abs() < 1e-5));
+    let most = positions.iter().fold(f32::MIN, |m, p| m.max(p[0]));
+    assert_eq!(most, 23.5 * 30.0);
+    // Front faces look up.
+    let corners: Vec<usize> = reader.read_indices().unwrap().into_u32().map(|i| i as usize).collect();
+    for t in corners.chunks_exact(3) {
+        let [a, b, c] = [positions[t[0]], positions[t[1]], positions[t[2]]];
+        let up = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2]);
+        assert!(up > 0.0);
+    }
+    let extras = document.scenes().next().unwrap().extras().clone().unwrap();
+    assert!(extras.get().contains("terrain_exaggeration"), "{extras}");
+    let unknown = p.done(&format!("terrain tin hills.raw out.glb --max-error 6 {RAW}"));
+    assert!(unknown.stderr.contains("--spacing"), "{}", unknown.stderr);
+}
+
+#[test]
+fn the_number_of_threads_does_not_show() {
+    let p = place();
+    for how in ["--max-error 4", "--max-error 4 --on-samples", "--triangles 300"] {
+        for threads in [1, 2] {
+            p.done(&format!("terrain tin hills.raw {threads}.ply {how} {RAW} --threads {threads} -q"));
+        }
+        assert!(p.read("1.ply") == p.read("2.ply"), "{how}");
+    }
+}
+
+#[test]
+fn a_picture_shows_it() {
+    let p = place();
+    p.done(&format!("terrain tin hills.raw out.ply --max-error 6 {RAW} --png out.png --wireframe"));
+    assert!(p.read("out.png").starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn what_cannot_be_is_said() {
+    let p = place();
+    p.run(&format!("terrain tin hills.raw out.ply {RAW}")).failed(2, "--max-error");
+    p.run(&format!("terrain tin hills.raw out.ply --max-error -1 {RAW}")).failed(2, "0 or more");
+    p.run(&format!("terrain tin hills.raw out.xyz --max-error 1 {RAW}")).failed(2, "--to");
+    p.run(&format!("terrain tin none.raw out.ply --max-error 1 {RAW}")).failed(3, "none.raw");
+    p.run("terrain tin hills.raw out.ply --max-error 1").failed(2, "--size");
+    p.run("terrain tin hills.raw out.ply --max-error 1 --size 960x2 --type f64").failed(3, "hills.raw");
+    // All void, and one row.
+    p.write("void.raw", [0u8; 200]);
+    p.run("terrain tin void.raw out.ply --max-error 1 --size 10x10 --type i16 --nodata 0").failed(3, "nothing");
+    p.run("terrain tin void.raw out.ply --max-error 1 --size 100x1 --type i16").failed(3, "nothing");
+    // A constant height is two triangles; a height of 1e30 among others leaves too few bits for a small error.
+    let flat = p.done("terrain tin void.raw out.ply --max-error 0 --size 10x10 --type i16 --json -q").json();
+    assert_eq!(flat["triangles"], 2);
+    let heights = [1e30f64, 2.0, 3.5, 4.1];
+    p.write("spike.raw", heights.iter().flat_map(|h| h.to_le_bytes()).collect::<Vec<_>>());
+    p.run("terrain tin spike.raw out.ply --max-error 1 --size 2x2 --type f64").failed(3, "--nodata");
+}
