@@ -128,7 +128,8 @@ fn what_cannot_be_is_said() {
     p.run("terrain tin hills.raw out.ply --max-error 1 --size 960x2 --type f64").failed(3, "hills.raw");
     // All void, and one row.
     p.write("void.raw", [0u8; 200]);
-    p.run("terrain tin void.raw out.ply --max-error 1 --size 10x10 --type i16 --nodata 0").failed(3, "nothing");
+    p.run("terrain tin void.raw out.ply --max-error 1 --size 10x10 --type i16 --nodata 0")
+        .failed(3, "nothing");
     p.run("terrain tin void.raw out.ply --max-error 1 --size 100x1 --type i16").failed(3, "nothing");
     // A constant height is two triangles; a height of 1e30 among others leaves too few bits for a small error.
     let flat = p.done("terrain tin void.raw out.ply --max-error 0 --size 10x10 --type i16 --json -q").json();

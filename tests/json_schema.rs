@@ -721,12 +721,98 @@ fn compare_prints_one_object_with_the_documented_fields() {
     assert!(t.read + t.distance + t.certify + t.details + t.draw <= t.total + 1e-3);
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TerrainTin {
+    command: String,
+    file: String,
+    columns: usize,
+    rows: usize,
+    valid: usize,
+    isolated: usize,
+    grid_triangles: usize,
+    method: String,
+    on_samples: bool,
+    #[serde(deserialize_with = "present")]
+    max_error: Option<f64>,
+    #[serde(deserialize_with = "present")]
+    max_triangles: Option<usize>,
+    triangles: usize,
+    vertices: usize,
+    error: TerrainError,
+    #[serde(deserialize_with = "present")]
+    step: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    verified: Option<TerrainVerified>,
+    space: String,
+    #[serde(deserialize_with = "present")]
+    spacing: Option<[f64; 2]>,
+    #[serde(deserialize_with = "present")]
+    exaggeration: Option<f64>,
+    seconds: TerrainSeconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TerrainError {
+    max: f64,
+    rms: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TerrainVerified {
+    good: bool,
+    exact: bool,
+    max: f64,
+    beyond: usize,
+    uncovered: usize,
+    over_void: usize,
+    turned: usize,
+    flat: usize,
+    excess_area: i64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TerrainSeconds {
+    read: f64,
+    make: f64,
+    verify: f64,
+    write: f64,
+    draw: f64,
+    total: f64,
+}
+
+/// Twelve columns and ten rows of 8-bit heights.
+const TERRAIN: &str = "terrain tin grid.raw out.glb --size 12x10 --type u8 --max-error 3 --verify --json";
+
+fn terrain(p: &Place) {
+    p.write("grid.raw", (0..120u32).map(|i| (i * i % 37) as u8).collect::<Vec<_>>());
+}
+
+#[test]
+fn terrain_tin() {
+    let p = Place::new();
+    terrain(&p);
+    let tin: TerrainTin = serde_json::from_str(&p.done(TERRAIN).stdout).unwrap();
+    assert_eq!((tin.columns, tin.rows, tin.valid, tin.isolated), (12, 10, 120, 0));
+    assert_eq!((tin.command.as_str(), tin.grid_triangles), ("terrain tin", 198));
+    let verified = tin.verified.unwrap();
+    assert!(verified.good && tin.error.max <= 3.0 && tin.error.rms <= tin.error.max);
+    let regular: TerrainTin =
+        serde_json::from_str(&p.done(&format!("{TERRAIN} --method regular --space grid")).stdout).unwrap();
+    assert!(regular.step.is_some() && regular.spacing.is_none() && tin.spacing.is_some());
+}
+
 #[test]
 fn every_field_is_documented() {
     let documentation = include_str!("../docs/json.md");
     let p = Place::new();
     p.generate("quad-sphere", "in.obj", 96);
     p.generate("torus", "torus.obj", 96);
+    terrain(&p);
     let simplified = p.done("simplify torus.obj out.obj --max-error 0.1 --certified --measure --json").json();
     let others = [
         "info in.obj --json",
@@ -739,6 +825,7 @@ fn every_field_is_documented() {
         "levels in.obj --json --runs 1 --samples 100 --epsilon 60",
         "convert in.obj out.ply --json",
         "generate sphere s.ply --faces 20 --json",
+        TERRAIN,
     ];
     for object in others.map(|a| p.done(a).json()).into_iter().chain([simplified]) {
         let mut values = vec![&object];
