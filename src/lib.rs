@@ -20,6 +20,7 @@ pub mod progressive;
 pub mod report;
 pub mod samples;
 pub mod scene;
+pub mod views;
 
 /// The README's example must compile.
 #[cfg(all(doctest, feature = "files"))]

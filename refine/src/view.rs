@@ -7,6 +7,7 @@
 //! Every test is conservative: what it calls invisible is (but for rounding in the last place), what it does not may still be.
 
 mod camera;
+pub mod clip;
 mod cone;
 mod frustum;
 

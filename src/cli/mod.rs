@@ -4,11 +4,14 @@
 //! target was missed (or a check failed), 2 usage, 3 input unreadable or invalid, 4 output failed, 130 interrupted.
 
 mod args;
+mod camera;
+mod clip;
 mod common;
 mod compare;
 mod completions;
 mod control;
 mod convert;
+mod cull;
 mod decode;
 mod encode;
 mod generate;
@@ -50,6 +53,8 @@ enum Command {
     Morph(morph::Args),
     Compare(compare::Args),
     Convert(convert::Args),
+    Clip(Box<clip::Args>),
+    Cull(cull::Args),
     Generate(generate::Args),
     Terrain(Box<terrain::Args>),
     Completions(completions::Args),
@@ -122,6 +127,8 @@ pub(crate) fn main() -> ExitCode {
         Command::Morph(args) => args.run(),
         Command::Compare(args) => args.run(),
         Command::Convert(args) => args.run(),
+        Command::Clip(args) => args.run(),
+        Command::Cull(args) => args.run(),
         Command::Generate(args) => args.run(),
         Command::Terrain(args) => args.run(),
         Command::Completions(args) => args.run(),

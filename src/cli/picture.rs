@@ -10,7 +10,7 @@ use std::time::Instant;
 /// `--png`, `--wireframe`: a picture.
 #[derive(clap::Args, Debug)]
 pub(crate) struct PictureArgs {
-    /// Draw a picture to this PNG file (with simplify: input and result side by side, with lod all levels, from the same camera)
+    /// Draw a picture to this PNG file (with simplify, clip and cull: input and result side by side, with lod all levels, from the same camera)
     ///
     /// Material base colours and the mesh's normals; no textures.
     #[arg(long, value_name = "FILE.png", value_parser = png_name, help_heading = "Picture")]

@@ -23,6 +23,7 @@ mod columns;
 mod container;
 mod decode;
 mod document;
+mod edit;
 mod encode;
 mod geometry;
 mod images;

@@ -1,0 +1,549 @@
+//! Clipping whole meshes.
+//!
+//! Plane by plane. Every vertex has one side, decided exactly, every edge one crossing, shared by its faces: what was connected stays so, and the cut
+//! of a closed mesh is closed loops, whatever rounding does to places.
+
+use super::cap::{self, Side};
+use super::exact::{fraction, side};
+use super::join::{Chain, End, Node, Whole, chains, follow, next};
+use crate::aif::{BuildError, MeshInput, NONE, Positions, Semantic, TooManyChannels, Wedges};
+use glam::{DVec3, DVec4};
+use rustc_hash::FxHashMap;
+
+/// A mesh after [`clip_mesh`].
+#[derive(Clone, Debug, Default)]
+#[non_exhaustive]
+pub struct MeshClip {
+    /// What is left. Vertices and wedges that nothing uses any more are gone, the others in their order.
+    pub mesh: MeshInput,
+    /// Faces that were cut, of the input and of caps.
+    pub cut: usize,
+    /// Faces of which nothing is left.
+    pub dropped: usize,
+    /// Triangles of caps.
+    pub capped: usize,
+    /// Loops of the cuts that caps close.
+    pub loops: usize,
+    /// Edges of the cuts that are on no loop, because the mesh is open there: no cap closes them.
+    pub open_edges: usize,
+}
+
+/// Why a mesh could not be clipped.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshClipError {
+    /// A mesh that [`crate::aif::Mesh::build`] would refuse.
+    #[error(transparent)]
+    Mesh(#[from] BuildError),
+    /// A plane with numbers that are not finite.
+    #[error("plane {0} is not finite")]
+    Plane(usize),
+    /// More vertices or corners than ids.
+    #[error("the clipped mesh has more than 2^32 - 2 vertices or corners")]
+    TooLarge,
+    /// More attributes than a wedge can have.
+    #[error(transparent)]
+    Attributes(#[from] TooManyChannels),
+}
+
+/// The part of a mesh where all planes `[a, b, c, d]` have ax + by + cz + d >= 0, in the mesh's coordinates.
+///
+/// Faces keep their order, orientation, material and group; a face that is not convex may become several. New vertices lie on the cut edges
+/// (once an edge, for all its faces) and are rounded to the mesh's precision; planes square to an axis are met exactly. Attributes are interpolated,
+/// normals and tangents of unit length; joint indices are taken from the end nearer by. Edges without a face are cut too; vertices of
+/// nothing stay if they are inside.
+///
+/// Faces that lie in a plane stay. With `cap`, where the mesh is the surface of a solid, those stay only that turn their back to the plane, and the cut is closed
+/// with triangles between its loops, holes left open: a closed mesh stays closed, every cut edge with two faces. Caps take material and group of
+/// the faces along them, attributes of their corners, and the plane's normal. Where the mesh is open at the cut there is no loop to close
+/// ([`MeshClip::open_edges`]). If it intersects itself there, caps may overlap; they still close it.
+///
+/// Deterministic. O(planes * faces) and, for caps of n corners, O(n log n) to O(n^2).
+pub fn clip_mesh(input: &MeshInput, planes: &[DVec4], cap: bool) -> Result<MeshClip, MeshClipError> {
+    input.validate()?;
+    if let Some(k) = planes.iter().position(|p| !p.is_finite()) {
+        return Err(MeshClipError::Plane(k));
+    }
+    let mut work = Work::new(input);
+    for &plane in planes {
+        work.cut_by(plane, cap)?;
+    }
+    work.finish(input)
+}
+
+/// Faces of a mesh on their way through the planes: flat, in order.
+#[derive(Default)]
+struct Faces {
+    sizes: Vec<u32>,
+    corners: Vec<u32>,
+    /// Wedges of the corners; empty without any.
+    wedges: Vec<u32>,
+    /// The face of the input that each comes from, or takes material and group of.
+    origin: Vec<u32>,
+    is_cap: Vec<bool>,
+}
+
+impl Faces {
+    fn clear(&mut self) {
+        self.sizes.clear();
+        self.corners.clear();
+        self.wedges.clear();
+        self.origin.clear();
+        self.is_cap.clear();
+    }
+
+    fn put(
+        &mut self,
+        corners: impl Iterator<Item = (u32, u32)>,
+        with_wedges: bool,
+        origin: u32,
+        is_cap: bool,
+    ) {
+        let before = self.corners.len();
+        for (v, w) in corners {
+            self.corners.push(v);
+            if with_wedges {
+                self.wedges.push(w);
+            }
+        }
+        self.sizes.push((self.corners.len() - before) as u32);
+        self.origin.push(origin);
+        self.is_cap.push(is_cap);
+    }
+}
+
+struct Work {
+    points: Vec<DVec3>,
+    single: bool,
+    wedges: Option<Wedges>,
+    faces: Faces,
+    next: Faces,
+    wires: Vec<[u32; 2]>,
+    /// Vertices that nothing uses in the input, while they are inside.
+    lonely: Vec<u32>,
+    sides: Vec<f64>,
+    /// Edge -> vertex where the plane cuts it.
+    crossings: FxHashMap<[u32; 2], u32>,
+    /// (Vertex there, wedges of the ends) -> wedge there.
+    mixed: FxHashMap<[u32; 3], u32>,
+    done: MeshClip,
+}
+
+impl Work {
+    fn new(input: &MeshInput) -> Work {
+        let n = input.positions.len();
+        let mut used = vec![false; n];
+        input.corners.iter().chain(input.wires.as_flattened()).for_each(|&v| used[v as usize] = true);
+        let count = input.face_count();
+        Work {
+            points: input.positions.iter().collect(),
+            single: !input.positions.is_f64(),
+            wedges: input.wedges.clone(),
+            faces: Faces {
+                sizes: input.face_sizes.clone().unwrap_or_else(|| vec![3; count]),
+                corners: input.corners.clone(),
+                wedges: input.wedges.as_ref().map_or(vec![], |w| w.corner.clone()),
+                origin: (0..count as u32).collect(),
+                is_cap: vec![false; count],
+            },
+            next: Faces::default(),
+            wires: input.wires.clone(),
+            lonely: (0..n as u32).filter(|&v| !used[v as usize]).collect(),
+            sides: vec![],
+            crossings: FxHashMap::default(),
+            mixed: FxHashMap::default(),
+            done: MeshClip::default(),
+        }
+    }
+
+    fn cut_by(&mut self, plane: DVec4, cap: bool) -> Result<(), MeshClipError> {
+        self.sides.clear();
+        self.sides.extend(self.points.iter().map(|p| side(plane, p.extend(1.0))));
+        if self.sides.iter().all(|&s| s >= 0.0) {
+            return Ok(());
+        }
+        self.crossings.clear();
+        self.mixed.clear();
+        self.next.clear();
+        let faces = std::mem::take(&mut self.faces);
+        let (mut start, mut pieces) = (0, Pieces::default());
+        for f in 0..faces.sizes.len() {
+            let slots = start..start + faces.sizes[f] as usize;
+            start = slots.end;
+            let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+            for &v in &faces.corners[slots.clone()] {
+                let s = self.sides[v as usize];
+                (least, most) = (least.min(s), most.max(s));
+            }
+            let stays = match (least < 0.0, most > 0.0) {
+                (false, true) => true,
+                // In the plane. Of a solid, the side that is kept lies behind the face.
+                (false, false) => {
+                    !cap || self.normal(&faces.corners[slots.clone()]).dot(plane.truncate()) < 0.0
+                }
+                (true, false) => false,
+                (true, true) => {
+                    self.cut_face(&faces, f, slots, plane, &mut pieces)?;
+                    self.done.cut += 1;
+                    continue;
+                }
+            };
+            if stays {
+                let wedge = |c: usize| faces.wedges.get(c).copied().unwrap_or(NONE);
+                let corners = slots.map(|c| (faces.corners[c], wedge(c)));
+                self.next.put(corners, self.wedges.is_some(), faces.origin[f], faces.is_cap[f]);
+            } else {
+                self.done.dropped += 1;
+            }
+        }
+        self.faces = std::mem::replace(&mut self.next, faces);
+        self.cut_wires(plane)?;
+        let sides = &self.sides;
+        self.lonely.retain(|&v| sides[v as usize] >= 0.0);
+        if cap { self.cap(plane) } else { Ok(()) }
+    }
+
+    /// Twice the area vector of a face.
+    fn normal(&self, corners: &[u32]) -> DVec3 {
+        let at = |i: usize| self.points[corners[i] as usize] - self.points[corners[0] as usize];
+        (1..corners.len() - 1).map(|i| at(i).cross(at(i + 1))).sum()
+    }
+
+    /// The vertex where the plane cuts an edge.
+    fn crossing(&mut self, a: u32, b: u32, plane: DVec4) -> Result<u32, MeshClipError> {
+        let key = [a.min(b), a.max(b)];
+        if let Some(&v) = self.crossings.get(&key) {
+            return Ok(v);
+        }
+        let at = |v: u32| (self.points[v as usize], self.sides[v as usize]);
+        let ((p, sp), (q, sq)) = (at(a), at(b));
+        let (from, to, t) = fraction(p, sp, q, sq);
+        let mut place = from + (to - from) * t;
+        // Square to an axis: all of the cut has the same coordinate.
+        for k in 0..3 {
+            if plane.truncate().abs() == DVec3::AXES[k] * plane[k].abs() {
+                place[k] = -plane.w / plane[k];
+            }
+        }
+        if self.single {
+            place = place.as_vec3().as_dvec3();
+        }
+        if self.points.len() >= NONE as usize - 1 {
+            return Err(MeshClipError::TooLarge);
+        }
+        let v = self.points.len() as u32;
+        self.points.push(place);
+        self.crossings.insert(key, v);
+        Ok(v)
+    }
+
+    /// The wedge at crossing `v` of the edge from vertex a (with wedge wa) to b (wb).
+    fn mixed(&mut self, v: u32, a: (u32, u32), b: (u32, u32)) -> u32 {
+        let Some(wedges) = &mut self.wedges else { return NONE };
+        if a.1 == NONE || b.1 == NONE {
+            return NONE;
+        }
+        let (low, high) = if a.0 < b.0 { (a, b) } else { (b, a) };
+        *self.mixed.entry([v, low.1, high.1]).or_insert_with(|| {
+            let s = |v: u32| self.sides[v as usize];
+            let (from, to, t) = fraction(a.1, s(a.0), b.1, s(b.0));
+            mix_wedges(wedges, from, to, t)
+        })
+    }
+
+    /// Puts what is left of a face that the plane cuts.
+    fn cut_face(
+        &mut self,
+        faces: &Faces,
+        f: usize,
+        slots: std::ops::Range<usize>,
+        plane: DVec4,
+        pieces: &mut Pieces,
+    ) -> Result<(), MeshClipError> {
+        let corners = &faces.corners[slots.clone()];
+        let n = corners.len() as u32;
+        pieces.sides.clear();
+        pieces.sides.extend(corners.iter().map(|&v| self.sides[v as usize]));
+        pieces.chains.clear();
+        if chains(0, n, &pieces.sides, &mut pieces.chains) != Whole::Cut {
+            return Ok(());
+        }
+        let following = if pieces.chains.len() == 1 {
+            vec![0]
+        } else {
+            self.order_chains(corners, &pieces.chains, &pieces.sides, plane)
+        };
+        let wedge = |i: u32| faces.wedges.get(slots.start + i as usize).copied().unwrap_or(NONE);
+        pieces.done.clear();
+        pieces.done.resize(pieces.chains.len(), false);
+        for first in 0..pieces.chains.len() {
+            pieces.cycle.clear();
+            let mut c = first;
+            while !std::mem::replace(&mut pieces.done[c], true) {
+                let chain = pieces.chains[c];
+                let node = |me: &mut Self, node: Node| -> Result<(u32, u32), MeshClipError> {
+                    Ok(match node {
+                        Node::Vertex(i) => (corners[i as usize], wedge(i)),
+                        Node::Edge(i) => {
+                            let j = next(i, 0, n);
+                            let (a, b) = ((corners[i as usize], wedge(i)), (corners[j as usize], wedge(j)));
+                            let v = me.crossing(a.0, b.0, plane)?;
+                            (v, me.mixed(v, a, b))
+                        }
+                    })
+                };
+                let start = node(self, chain.start)?;
+                if pieces.cycle.last() != Some(&start) {
+                    pieces.cycle.push(start);
+                }
+                let mut i = chain.first;
+                loop {
+                    pieces.cycle.push((corners[i as usize], wedge(i)));
+                    if i == chain.last {
+                        break;
+                    }
+                    i = next(i, 0, n);
+                }
+                pieces.cycle.push(node(self, chain.end)?);
+                c = following[c] as usize;
+            }
+            // The boundary may end where it began.
+            while pieces.cycle.len() > 1 && pieces.cycle.first() == pieces.cycle.last() {
+                pieces.cycle.pop();
+            }
+            if pieces.cycle.len() >= 3 {
+                let corners = pieces.cycle.iter().copied();
+                self.next.put(corners, self.wedges.is_some(), faces.origin[f], faces.is_cap[f]);
+            }
+        }
+        Ok(())
+    }
+
+    /// Which chain follows which, of a face that is not convex: by their places along the cut.
+    fn order_chains(&self, corners: &[u32], chains: &[Chain], sides: &[f64], plane: DVec4) -> Vec<u32> {
+        let n = corners.len() as u32;
+        let along = plane.truncate().cross(self.normal(corners));
+        let at = |i: u32| {
+            (self.points[corners[i as usize] as usize] - self.points[corners[0] as usize]).dot(along)
+        };
+        let place = |node: Node| match node {
+            Node::Vertex(i) => at(i),
+            Node::Edge(i) => {
+                let j = next(i, 0, n);
+                let (from, to, t) = fraction(at(i), sides[i as usize], at(j), sides[j as usize]);
+                from + (to - from) * t
+            }
+        };
+        // Where the end is, and the cotangent of the angle of the edge there.
+        let key = |e: &End| {
+            let chain = &chains[e.chain as usize];
+            let (node, inner) = if e.start { (chain.start, chain.first) } else { (chain.end, chain.last) };
+            let place = place(node);
+            (place, (at(inner) - place) / sides[inner as usize])
+        };
+        follow(chains, |a, b| {
+            let (a, b) = (key(a), key(b));
+            a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+        })
+    }
+
+    fn cut_wires(&mut self, plane: DVec4) -> Result<(), MeshClipError> {
+        let mut kept = Vec::with_capacity(self.wires.len());
+        for [a, b] in std::mem::take(&mut self.wires) {
+            let (sa, sb) = (self.sides[a as usize], self.sides[b as usize]);
+            match (sa >= 0.0, sb >= 0.0) {
+                (true, true) => kept.push([a, b]),
+                (true, false) if sa > 0.0 => kept.push([a, self.crossing(a, b, plane)?]),
+                (false, true) if sb > 0.0 => kept.push([self.crossing(a, b, plane)?, b]),
+                _ => {}
+            }
+        }
+        self.wires = kept;
+        Ok(())
+    }
+
+    /// Closes the cut that was just made.
+    fn cap(&mut self, plane: DVec4) -> Result<(), MeshClipError> {
+        // New vertices have no side; they are on the plane.
+        let on = |v: u32| self.sides.get(v as usize).is_none_or(|&s| s == 0.0);
+        let mut border: Vec<Side> = Vec::new();
+        let mut start = 0;
+        for f in 0..self.faces.sizes.len() {
+            let (from, to) = (start, start + self.faces.sizes[f]);
+            start = to;
+            for c in from..to {
+                let d = next(c, from, to);
+                let (a, b) = (self.faces.corners[c as usize], self.faces.corners[d as usize]);
+                if on(a) && on(b) {
+                    let wedge = |c: u32| self.faces.wedges.get(c as usize).copied().unwrap_or(NONE);
+                    border.push(Side {
+                        ends: [a, b],
+                        wedges: [wedge(c), wedge(d)],
+                        face: self.faces.origin[f],
+                    });
+                }
+            }
+        }
+        let normal = -plane.truncate();
+        let caps = cap::caps(&self.points, normal, border);
+        self.done.loops += caps.loops;
+        self.done.open_edges += caps.open_edges;
+        let mut own: FxHashMap<u32, u32> = FxHashMap::default();
+        let unit = normal.normalize_or_zero().as_vec3().to_array();
+        for cap in caps.triangles {
+            let corners = cap.corners.map(|(v, w)| {
+                let Some(wedges) = self.wedges.as_mut().filter(|_| w != NONE) else { return (v, NONE) };
+                (v, *own.entry(w).or_insert_with(|| cap_wedge(wedges, w, unit)))
+            });
+            self.faces.put(corners.into_iter(), self.wedges.is_some(), cap.face, true);
+            self.done.capped += 1;
+        }
+        if self.faces.corners.len() >= NONE as usize { Err(MeshClipError::TooLarge) } else { Ok(()) }
+    }
+
+    fn finish(mut self, input: &MeshInput) -> Result<MeshClip, MeshClipError> {
+        // Caps that were cut again are counted as they are now.
+        self.done.capped = self.faces.is_cap.iter().filter(|&&c| c).count();
+        let gathered = Gathered {
+            points: &self.points,
+            single: self.single,
+            wedges: self.wedges.as_ref(),
+            faces: &self.faces,
+            wires: &self.wires,
+            lonely: &self.lonely,
+        };
+        self.done.mesh = gathered.mesh(input)?;
+        Ok(self.done)
+    }
+}
+
+/// Scratch for cutting one face.
+#[derive(Default)]
+struct Pieces {
+    sides: Vec<f64>,
+    chains: Vec<Chain>,
+    done: Vec<bool>,
+    cycle: Vec<(u32, u32)>,
+}
+
+/// What is between two wedges, `t` of the way.
+fn mix_wedges(wedges: &mut Wedges, from: u32, to: u32, t: f64) -> u32 {
+    if from == to {
+        return from;
+    }
+    let mut row: Vec<f32> = Vec::with_capacity(wedges.stride());
+    for (k, channel) in wedges.channels().iter().enumerate() {
+        let at = wedges.offset(k)..wedges.offset(k) + channel.width;
+        let (a, b) = (&wedges.row(from)[at.clone()], &wedges.row(to)[at]);
+        let begin = row.len();
+        // Joints and their weights belong together.
+        if matches!(channel.semantic, Semantic::Joints(_) | Semantic::Weights(_)) {
+            row.extend_from_slice(if t <= 0.5 { a } else { b });
+            continue;
+        }
+        row.extend(a.iter().zip(b).map(|(&a, &b)| (a as f64 + (b as f64 - a as f64) * t) as f32));
+        if matches!(channel.semantic, Semantic::Normal | Semantic::Tangent) {
+            let length = row[begin..].iter().take(3).map(|&x| x as f64 * x as f64).sum::<f64>().sqrt();
+            if length > 0.0 {
+                row[begin..].iter_mut().take(3).for_each(|x| *x = (*x as f64 / length) as f32);
+            } else {
+                row[begin..].copy_from_slice(a);
+            }
+            if channel.width > 3 {
+                // Handedness is a sign.
+                row[begin + 3] = if t <= 0.5 { a[3] } else { b[3] };
+            }
+        }
+    }
+    let present = wedges.present(from) & wedges.present(to);
+    wedges.push(&row, present)
+}
+
+/// A wedge's values with the normal of a cap, and without a tangent.
+fn cap_wedge(wedges: &mut Wedges, w: u32, normal: [f32; 3]) -> u32 {
+    let (mut row, mut present) = (wedges.row(w).to_vec(), wedges.present(w));
+    for (k, channel) in wedges.channels().iter().enumerate() {
+        let at = wedges.offset(k);
+        match channel.semantic {
+            Semantic::Normal if channel.width == 3 => row[at..at + 3].copy_from_slice(&normal),
+            Semantic::Tangent => present &= !(1 << k),
+            _ => {}
+        }
+    }
+    wedges.push(&row, present)
+}
+
+/// What is left of a mesh, before it is put together.
+struct Gathered<'a> {
+    points: &'a [DVec3],
+    single: bool,
+    wedges: Option<&'a Wedges>,
+    faces: &'a Faces,
+    wires: &'a [[u32; 2]],
+    lonely: &'a [u32],
+}
+
+impl Gathered<'_> {
+    fn mesh(&self, input: &MeshInput) -> Result<MeshInput, MeshClipError> {
+        let mut map = vec![NONE; self.points.len()];
+        for &v in self.faces.corners.iter().chain(self.wires.as_flattened()).chain(self.lonely) {
+            map[v as usize] = 0;
+        }
+        let mut places = Vec::new();
+        for (v, to) in map.iter_mut().enumerate().filter(|(_, to)| **to != NONE) {
+            *to = places.len() as u32;
+            places.push(self.points[v]);
+        }
+        let positions = if self.single {
+            Positions::F32(places.iter().map(|p| p.as_vec3().to_array()).collect())
+        } else {
+            Positions::F64(places.iter().map(|p| p.to_array()).collect())
+        };
+        let per_face = |old: &[u32]| match old {
+            [] => vec![],
+            old => self.faces.origin.iter().map(|&f| old[f as usize]).collect(),
+        };
+        let all_triangles = input.face_sizes.is_none() && self.faces.sizes.iter().all(|&n| n == 3);
+        Ok(MeshInput {
+            positions,
+            face_sizes: (!all_triangles).then(|| self.faces.sizes.clone()),
+            corners: self.faces.corners.iter().map(|&v| map[v as usize]).collect(),
+            wires: self.wires.iter().map(|w| w.map(|v| map[v as usize])).collect(),
+            wedges: self.wedges.map(|w| used_wedges(w, &self.faces.wedges)).transpose()?,
+            face_material: per_face(&input.face_material),
+            face_group: per_face(&input.face_group),
+        })
+    }
+}
+
+/// The wedges that corners use, in their order.
+fn used_wedges(wedges: &Wedges, corner: &[u32]) -> Result<Wedges, TooManyChannels> {
+    let mut map = vec![NONE; wedges.len()];
+    corner.iter().filter(|&&w| w != NONE).for_each(|&w| map[w as usize] = 0);
+    let mut out = Wedges::new(wedges.channels().to_vec())?;
+    for (w, to) in map.iter_mut().enumerate().filter(|(_, to)| **to != NONE) {
+        *to = out.push(wedges.row(w as u32), wedges.present(w as u32));
+    }
+    out.corner = corner.iter().map(|&w| if w == NONE { NONE } else { map[w as usize] }).collect();
+    Ok(out)
+}
+
+/// The faces of a mesh that `keep` names (ascending), with what they use; edges without a face stay, vertices of nothing too.
+///
+/// Errors: a mesh that [`crate::aif::Mesh::build`] would refuse; a face out of range counts as one.
+pub fn gather_faces(input: &MeshInput, keep: &[u32]) -> Result<MeshInput, MeshClipError> {
+    input.validate()?;
+    let mut work = Work::new(input);
+    let all = std::mem::take(&mut work.faces);
+    let mut starts = vec![0usize];
+    starts.extend(all.sizes.iter().scan(0, |sum, &n| {
+        *sum += n as usize;
+        Some(*sum)
+    }));
+    for f in keep.iter().map(|&f| f as usize).filter(|&f| f < all.sizes.len()) {
+        let wedge = |c: usize| all.wedges.get(c).copied().unwrap_or(NONE);
+        let corners = (starts[f]..starts[f + 1]).map(|c| (all.corners[c], wedge(c)));
+        work.faces.put(corners, work.wedges.is_some(), f as u32, false);
+    }
+    work.finish(input).map(|done| done.mesh)
+}
