@@ -54,12 +54,15 @@ pub(super) fn each<E>(
     // The mesh's own place goes to the first replacement, unless something still shows it as it was.
     let mut taken = vec![false; scene.meshes.len()];
     let mut users = vec![0usize; scene.meshes.len()];
-    scene.nodes.iter().filter_map(|n| n.mesh).for_each(|m| users[m] += 1);
-    shown.iter().for_each(|&(_, m, _)| users[m] -= 1);
+    scene.nodes.iter().filter_map(|n| n.mesh.filter(|&m| m < taken.len())).for_each(|m| users[m] += 1);
+    let mut was_shown = vec![false; scene.meshes.len()];
+    for &(_, m, _) in &shown {
+        users[m] -= 1;
+        was_shown[m] = true;
+    }
     for (m, fate) in &fates {
         taken[*m] |= users[*m] > 0 || matches!(fate, Some(Fate::Keep));
     }
-    let was_shown: Vec<bool> = (0..taken.len()).map(|m| shown.iter().any(|s| s.1 == m)).collect();
     let mut target: Vec<Option<usize>> = Vec::new();
     for (m, fate) in &mut fates {
         target.push(match fate.take() {

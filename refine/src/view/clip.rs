@@ -15,6 +15,7 @@
 mod cap;
 mod convex;
 mod exact;
+mod gather;
 mod join;
 mod mesh;
 mod planar;

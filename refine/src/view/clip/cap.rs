@@ -4,6 +4,7 @@ use super::exact::orient;
 use crate::aif::triangulate_polygon;
 use glam::{DVec2, DVec3};
 use rustc_hash::FxHashMap;
+use std::cmp::Reverse;
 
 /// A side of a face that lies in the plane of the cut.
 #[derive(Clone, Copy, Debug)]
@@ -36,13 +37,18 @@ struct Loop {
     /// Vertices, wedges.
     corners: Vec<(u32, u32)>,
     places: Vec<DVec2>,
-    /// The face along it that is named most often.
+    /// A face along it, of the material and group that most of it has.
     face: u32,
     area: f64,
 }
 
-/// Caps with this normal for the sides that no other side runs against.
-pub(super) fn caps(points: &[DVec3], normal: DVec3, mut sides: Vec<Side>) -> Caps {
+/// Caps with this normal for the sides that no other side runs against. `label` is what of a face its cap takes over.
+pub(super) fn caps(
+    points: &[DVec3],
+    normal: DVec3,
+    mut sides: Vec<Side>,
+    label: &dyn Fn(u32) -> [u32; 2],
+) -> Caps {
     let mut caps = Caps::default();
     unpaired(&mut sides);
     let size = normal.abs();
@@ -53,7 +59,7 @@ pub(super) fn caps(points: &[DVec3], normal: DVec3, mut sides: Vec<Side>) -> Cap
         std::mem::swap(&mut x, &mut y);
     }
     let place = |v: u32| DVec2::new(points[v as usize][x], points[v as usize][y]);
-    let loops = trace(&sides, place, &mut caps.open_edges);
+    let loops = trace(&sides, &place, label, &mut caps.open_edges);
     caps.loops = loops.len();
     for mut group in nest(loops) {
         let merged = bridge(&mut group);
@@ -89,7 +95,12 @@ fn unpaired(sides: &mut Vec<Side>) {
 
 /// The loops that the sides make, backwards. Where several leave a vertex, that one is taken which leaves the cap's inside between: its pieces
 /// touch there and do not cross.
-fn trace(sides: &[Side], place: impl Fn(u32) -> DVec2, open: &mut usize) -> Vec<Loop> {
+fn trace(
+    sides: &[Side],
+    place: &impl Fn(u32) -> DVec2,
+    label: &dyn Fn(u32) -> [u32; 2],
+    open: &mut usize,
+) -> Vec<Loop> {
     // A cap's side leaves where the face's arrives.
     let mut leaving: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
     for (i, side) in sides.iter().enumerate() {
@@ -117,7 +128,7 @@ fn trace(sides: &[Side], place: impl Fn(u32) -> DVec2, open: &mut usize) -> Vec<
                 closed.iter().for_each(|&s| {
                     passed.remove(&sides[s as usize].ends[1]);
                 });
-                loops.push(make_loop(sides, &closed, &place));
+                loops.push(make_loop(sides, &closed, place, label));
             }
             let (p, q) = (place(from), place(to));
             let free = leaving.get(&to).into_iter().flatten().copied().filter(|&s| !used[s as usize]);
@@ -137,15 +148,24 @@ fn trace(sides: &[Side], place: impl Fn(u32) -> DVec2, open: &mut usize) -> Vec<
     loops
 }
 
-fn make_loop(sides: &[Side], path: &[u32], place: &impl Fn(u32) -> DVec2) -> Loop {
+fn make_loop(
+    sides: &[Side],
+    path: &[u32],
+    place: &impl Fn(u32) -> DVec2,
+    label: &dyn Fn(u32) -> [u32; 2],
+) -> Loop {
     let side = |&s: &u32| &sides[s as usize];
     let corners: Vec<_> = path.iter().map(|s| (side(s).ends[1], side(s).wedges[1])).collect();
     let places: Vec<_> = corners.iter().map(|&(v, _)| place(v)).collect();
-    let mut count: FxHashMap<u32, usize> = FxHashMap::default();
-    path.iter().for_each(|s| *count.entry(side(s).face).or_default() += 1);
-    let most = count.iter().max_by_key(|&(&face, &n)| (n, std::cmp::Reverse(face))).map_or(0, |(&f, _)| f);
+    // Label -> how often, and its least face.
+    let mut count: FxHashMap<[u32; 2], (usize, Reverse<u32>)> = FxHashMap::default();
+    for face in path.iter().map(|s| side(s).face) {
+        let entry = count.entry(label(face)).or_insert((0, Reverse(face)));
+        *entry = (entry.0 + 1, entry.1.max(Reverse(face)));
+    }
+    let face = count.values().max().map_or(0, |most| most.1.0);
     let area = area(&places);
-    Loop { corners, places, face: most, area }
+    Loop { corners, places, face, area }
 }
 
 /// Twice the area of a polygon, about its first corner.
