@@ -235,6 +235,7 @@ proptest! {
         let plane = normal.extend(-normal.dot(on));
         let parts = [plane, -plane].map(|p| clip_mesh(&input, &[p], true).unwrap());
         for part in &parts {
+            prop_assert_eq!(part.mesh.face_sizes.is_some(), input.face_sizes.is_some());
             prop_assert_eq!((border(&part.mesh), part.open_edges), (0, 0));
         }
         let volumes = [&parts[0].mesh, &parts[1].mesh, &input].map(volume);

@@ -81,10 +81,9 @@ impl Gathered<'_> {
             [] => vec![],
             old => self.faces.origin.iter().map(|&f| old[f as usize]).collect(),
         };
-        let all_triangles = input.face_sizes.is_none() && self.faces.sizes.iter().all(|&n| n == 3);
         Ok(MeshInput {
             positions,
-            face_sizes: (!all_triangles).then(|| self.faces.sizes.clone()),
+            face_sizes: input.face_sizes.is_some().then(|| self.faces.sizes.clone()),
             corners: self.faces.corners.iter().map(|&v| map[v as usize]).collect(),
             wires: self.wires.iter().map(|w| w.map(|v| map[v as usize])).collect(),
             wedges: self.wedges.map(|w| used_wedges(w, &self.faces.wedges)).transpose()?,

@@ -7,7 +7,7 @@ use super::cap::{self, Side};
 use super::exact::{fraction, side};
 use super::gather::{Gathered, cap_wedge, mix_wedges};
 use super::join::{Chain, End, Node, Whole, chains, follow, next};
-use crate::aif::{BuildError, MeshInput, NONE, TooManyChannels, Wedges};
+use crate::aif::{BuildError, MeshInput, NONE, TooManyChannels, Wedges, triangulate_polygon};
 use glam::{DVec3, DVec4};
 use rustc_hash::FxHashMap;
 
@@ -49,7 +49,8 @@ pub enum MeshClipError {
 
 /// The part of a mesh where all planes `[a, b, c, d]` have ax + by + cz + d >= 0, in the mesh's coordinates.
 ///
-/// Faces keep their order, orientation, material and group; a face that is not convex may become several. New vertices lie on the cut edges
+/// Faces keep their order, orientation, material and group; of a mesh of triangles alone, what is left is triangles, of another, polygons, and a face
+/// that is not convex may become several. New vertices lie on the cut edges
 /// (once an edge, for all its faces) and are rounded to the mesh's precision; planes square to an axis are met exactly. Attributes are interpolated,
 /// normals and tangents of unit length; joint indices are taken from the end nearer by. Edges without a face are cut too; vertices of
 /// nothing stay if they are inside.
@@ -407,7 +408,35 @@ impl<'a> Work<'a> {
         if self.faces.corners.len() >= NONE as usize { Err(MeshClipError::TooLarge) } else { Ok(()) }
     }
 
+    /// Cuts the polygons that cutting triangles left into triangles.
+    fn cut_into_triangles(&mut self) {
+        let faces = std::mem::take(&mut self.faces);
+        let (mut points, mut triangles, mut start) = (Vec::new(), Vec::new(), 0);
+        for (f, &n) in faces.sizes.iter().enumerate() {
+            let corner = |i: u32| {
+                let c = start + i as usize;
+                (faces.corners[c], faces.wedges.get(c).copied().unwrap_or(NONE))
+            };
+            triangles.clear();
+            if n > 3 {
+                points.clear();
+                points.extend((0..n).map(|i| self.points[corner(i).0 as usize]));
+                triangulate_polygon(&points, &mut triangles);
+            } else {
+                triangles.push([0, 1, 2]);
+            }
+            for t in &triangles {
+                let corners = t.iter().map(|&i| corner(i));
+                self.faces.put(corners, self.wedges.is_some(), faces.origin[f], faces.is_cap[f]);
+            }
+            start += n as usize;
+        }
+    }
+
     fn finish(mut self, input: &MeshInput) -> Result<MeshClip, MeshClipError> {
+        if input.face_sizes.is_none() {
+            self.cut_into_triangles();
+        }
         // Caps that were cut again are counted as they are now.
         self.done.capped = self.faces.is_cap.iter().filter(|&&c| c).count();
         let gathered = Gathered {
