@@ -18,6 +18,7 @@ mod cad;
 mod catalog;
 mod general;
 mod geodesic;
+mod heights;
 mod hostile;
 mod noise;
 mod quad_sphere;
@@ -28,5 +29,7 @@ mod torus;
 mod trig;
 
 pub use catalog::{Entry, GenerateError, GenerateOptions, MAX_FACES, generate, names};
+pub use heights::{LANDSCAPE_SIDE, Landscape};
 pub use noise::SplitMix64;
 pub use sample::{CornerValues, Material, Sample, Texture};
+pub use terrain::sheet;

@@ -20,7 +20,16 @@ pub(crate) fn terrain(faces: usize, seed: u64) -> Sample {
             uvs.push([u as f32, v as f32]);
         }
     }
-    let mut triangles = Vec::with_capacity(2 * (n * n) as usize);
+    let triangles = cells(n);
+    let mut sample = triangle_mesh(points, &triangles);
+    sample.uvs = Some(CornerValues { values: uvs, corner: sample.corners.clone() });
+    sample
+}
+
+/// Two triangles a cell of a square grid of n x n cells.
+fn cells(n: u32) -> Vec<[u32; 3]> {
+    let side = n + 1;
+    let mut triangles = Vec::with_capacity(2 * n as usize * n as usize);
     for y in 0..n {
         for x in 0..n {
             let at = |dx: u32, dy: u32| (y + dy) * side + x + dx;
@@ -29,7 +38,42 @@ pub(crate) fn terrain(faces: usize, seed: u64) -> Sample {
             triangles.extend(if (x + y) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] });
         }
     }
-    let mut sample = triangle_mesh(points, &triangles);
+    triangles
+}
+
+/// A square of `size` x `size` heights, row after row from the top, as a mesh: x and y `step` apart, y up the rows, z the height; uv is the place in the
+/// square. Fewer heights than that, or a size below 2, give an empty mesh. O(samples).
+#[must_use]
+pub fn sheet(size: usize, step: f64, heights: &[f64]) -> Sample {
+    let Some(n) = u32::try_from(size).ok().and_then(|s| s.checked_sub(1)).filter(|&n| n > 0) else {
+        return Sample::default();
+    };
+    if size.checked_mul(size).is_none_or(|samples| samples > heights.len() || samples > u32::MAX as usize) {
+        return Sample::default();
+    }
+    let places = || (0..size).flat_map(|y| (0..size).map(move |x| (x, y)));
+    // From the bottom row up, so that triangles look upwards.
+    let points = places()
+        .map(|(x, y)| DVec3::new(x as f64 * step, y as f64 * step, heights[(size - 1 - y) * size + x]));
+    let last = f64::from(n);
+    let uvs = places().map(|(x, y)| [(x as f64 / last) as f32, (y as f64 / last) as f32]).collect();
+    let mut sample = triangle_mesh(points.collect::<Vec<_>>(), &cells(n));
     sample.uvs = Some(CornerValues { values: uvs, corner: sample.corners.clone() });
     sample
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_has_its_heights_and_looks_up() {
+        let sheet = sheet(3, 2.0, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]);
+        assert_eq!((sheet.positions.len(), sheet.triangle_count()), (9, 8));
+        // The lower left sample is the first of the last row.
+        assert_eq!(sheet.positions[0], [0.0, 0.0, 6.0]);
+        assert_eq!(sheet.positions[8], [4.0, 4.0, 2.0]);
+        assert_eq!(super::sheet(1, 1.0, &[0.0]).positions.len(), 0);
+        assert_eq!(super::sheet(3, 1.0, &[0.0]).positions.len(), 0);
+    }
 }

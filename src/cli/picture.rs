@@ -37,7 +37,7 @@ pub(crate) struct Drawing {
 }
 
 /// A name that does not promise another kind of picture.
-fn png_name(text: &str) -> Result<PathBuf, String> {
+pub(crate) fn png_name(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     if files::is_dash(&path) {
         return Err("write the picture to a path, not to standard output".into());

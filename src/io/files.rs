@@ -70,6 +70,32 @@ pub enum OpenGridError {
     Grid(#[from] GridError),
 }
 
+/// Writes a file by what `write` puts out, all or nothing. Its directory must be there.
+pub fn write_with<E: From<io::Error>>(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> Result<(), E>,
+) -> Result<(), E> {
+    if is_dash(path) {
+        let mut out = io::BufWriter::new(io::stdout().lock());
+        write(&mut out)?;
+        return Ok(out.flush()?);
+    }
+    check_target(path)?;
+    let mut failed = None;
+    let staged = Staged::make(path, |file| {
+        let mut out = io::BufWriter::with_capacity(1 << 20, file);
+        if let Err(e) = write(&mut out) {
+            failed = Some(e);
+            return Ok(());
+        }
+        out.flush()
+    });
+    match failed {
+        Some(e) => Err(e),
+        None => Ok(staged?.publish()?),
+    }
+}
+
 /// Opens a height grid: GeoTIFF, HGT, ESRI ASCII, PNG or raw, by its content or the name's extension. Its heights are read when asked for.
 pub fn open_grid(path: &Path, options: &GridOptions) -> Result<GridFile, OpenGridError> {
     let source = open(path).map_err(OpenGridError::Io)?;
@@ -441,6 +467,10 @@ struct Staged {
 
 impl Staged {
     fn write(target: &Path, bytes: &[u8]) -> io::Result<Staged> {
+        Staged::make(target, |file| file.write_all(bytes))
+    }
+
+    fn make(target: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<Staged> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         // Through a symbolic link, so that what it points at is replaced and not the link.
         let target = fs::canonicalize(target).unwrap_or_else(|_| target.to_path_buf());
@@ -449,7 +479,7 @@ impl Staged {
             return Err(is_a_directory());
         }
         if existing.as_ref().is_some_and(|m| !m.is_file()) {
-            OpenOptions::new().write(true).open(&target)?.write_all(bytes)?;
+            write(&mut OpenOptions::new().write(true).open(&target)?)?;
             return Ok(Staged { target, temporary: None });
         }
         let (mut file, staged) = loop {
@@ -463,7 +493,7 @@ impl Staged {
                 Err(e) => return Err(e),
             }
         };
-        file.write_all(bytes)?;
+        write(&mut file)?;
         if let Some(m) = existing {
             // A file that is replaced keeps its mode. Where that is not allowed the default will do.
             let _ = file.set_permissions(m.permissions());

@@ -1,4 +1,5 @@
-//! Looking at results: pictures, heat maps and silhouettes of a scene, drawn in software, without a display; tables and pages.
+//! Looking at results: pictures, heat maps and silhouettes of a scene, maps of height grids, drawn in software, without a display; tables
+//! and pages.
 //!
 //! A [`Surface`] is what a scene shows, as triangles in the world; a [`View`] says from where; [`render`] draws a [`Picture`], and
 //! [`silhouette`] the [`Mask`] of what is covered. The same surface and view give the same pixels on every platform:
@@ -14,6 +15,7 @@ mod page;
 mod picture;
 pub mod plot;
 mod raster;
+mod relief;
 mod render;
 mod surface;
 mod table;
@@ -24,6 +26,7 @@ pub use colormap::{heat_bytes, heat_color};
 pub use heat::{Scale, Titles, heat_panels};
 pub use page::Page;
 pub use picture::Picture;
+pub use relief::relief;
 pub use render::{Mask, Shading, Style, render, render_painted, silhouette};
 pub use surface::{Surface, SurfaceError};
 pub use table::{Table, short};

@@ -47,6 +47,12 @@ impl Grid {
         Ok(Self { columns, rows, heights })
     }
 
+    /// The same of heights that are known to be as many as they must, and not infinite.
+    pub(crate) fn of_finite(columns: usize, rows: usize, heights: Vec<f64>) -> Self {
+        debug_assert!(heights.len() == columns * rows && !heights.iter().any(|h| h.is_infinite()));
+        Self { columns, rows, heights }
+    }
+
     /// Samples in a row.
     #[must_use]
     pub fn columns(&self) -> usize {

@@ -17,6 +17,9 @@
 mod cache;
 mod georeference;
 mod grid;
+mod hillshade;
+mod mosaic;
+mod overview;
 mod raster;
 mod summary;
 pub mod tin;
@@ -24,5 +27,8 @@ pub mod tin;
 pub use cache::BlockCache;
 pub use georeference::{Affine, Crs, CrsKind, GeoKeys, Georeference, SampleAt, metres_per_degree};
 pub use grid::{Grid, GridError};
+pub use hillshade::{hillshade, mean_slope};
+pub use mosaic::{Mosaic, MosaicError, Part};
+pub use overview::Overview;
 pub use raster::{Raster, RasterError, Window, check_window};
 pub use summary::{Summary, windows};

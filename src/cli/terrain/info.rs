@@ -3,10 +3,16 @@
 use super::input::{GridInput, unread};
 use crate::cli::Failure;
 use crate::cli::common::{self, Warnings, short, thousands};
+use crate::cli::picture::png_name;
 use progmesh::io::grid::GridFile;
-use progmesh::terrain::{Crs, CrsKind, SampleAt, Summary};
+use progmesh::report::relief;
+use progmesh::terrain::{Crs, CrsKind, Overview, SampleAt, Summary};
 use serde::Serialize;
 use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Pixels of the longer side of a map, at most.
+const MAP: usize = 1024;
 
 /// Say what a height grid holds: size, type, coordinate system, spacing, range, voids.
 ///
@@ -16,10 +22,14 @@ use std::fmt::Write;
 Examples:
   progmesh terrain info N57E011.hgt
   progmesh terrain info alps.tif --json
-  progmesh terrain info dem.raw --size 1025x1025 --type u16")]
+  progmesh terrain info dem.raw --size 1025x1025 --type u16
+  progmesh terrain info N57E011.hgt N57E012.hgt --png relief.png")]
 pub(crate) struct Args {
     #[command(flatten)]
     input: GridInput,
+    /// Draw a map to this PNG file: colours by height, lit from the north-west; voids striped
+    #[arg(long, value_name = "FILE.png", value_parser = png_name)]
+    png: Option<PathBuf>,
     /// Print one JSON object (see docs/json.md)
     #[arg(long)]
     json: bool,
@@ -32,13 +42,38 @@ impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let mut warnings = Warnings::new(self.quiet);
         let grid = self.input.open(&mut warnings)?;
-        let summary = Summary::of(&*grid.raster, |_, _| Ok(())).map_err(unread)?;
+        if let Some(path) = &self.png {
+            common::check_target(path)?;
+        }
+        let (columns, rows) = (grid.raster.columns(), grid.raster.rows());
+        let mut overview = self.png.as_ref().map(|_| Overview::new(columns, rows, MAP));
+        let summary = Summary::of(&*grid.raster, |window, heights| {
+            if let Some(o) = &mut overview {
+                o.add(window, heights);
+            }
+            Ok(())
+        });
+        let summary = summary.map_err(unread)?;
+        if let (Some(path), Some(overview)) = (&self.png, overview) {
+            write_map(path, overview, &grid)?;
+        }
         let info = Info::of(self.input.name(), &grid, &summary, warnings.all);
         if self.json {
             return common::print_json(&info);
         }
         common::print(&common::harmless(&info.text()))
     }
+}
+
+fn write_map(path: &Path, overview: Overview, grid: &GridFile) -> Result<(), Failure> {
+    let place = &grid.georeference;
+    let (columns, rows) = (grid.raster.columns(), grid.raster.rows());
+    let spacing = place.spacing_metres(columns, rows).or(place.spacing()).unwrap_or([1.0; 2]);
+    let step = overview.step() as f64;
+    let bytes = relief(&overview.finish(), spacing.map(|s| s * step)).png();
+    let bytes = bytes
+        .ok_or_else(|| Failure::Output(format!("{}: the picture could not be encoded", path.display())))?;
+    common::write_bytes(path, &bytes)
 }
 
 /// The schema of `terrain info --json`; docs/json.md says what each field means.

@@ -4,16 +4,18 @@ use crate::cli::Failure;
 use crate::cli::common::{self, Warnings, thousands};
 use clap::ValueEnum;
 use progmesh::io::files::{self, OpenGridError};
-use progmesh::io::grid::{ByteOrder, Encoding, GridError, GridFile, GridFormat, GridOptions, SampleType};
+use progmesh::io::grid::{
+    self, ByteOrder, Encoding, GridError, GridFile, GridFormat, GridOptions, SampleType,
+};
 use progmesh::terrain::{Grid, RasterError};
 use std::path::PathBuf;
 
 /// `GRID` and how to read it.
 #[derive(clap::Args, Debug)]
 pub(crate) struct GridInput {
-    /// The height grid to read; - for standard input
-    #[arg(value_name = "GRID")]
-    grid: PathBuf,
+    /// The height grid to read, or several of one spacing that lie beside each other; - for standard input
+    #[arg(value_name = "GRID", required = true, num_args = 1..)]
+    grids: Vec<PathBuf>,
     /// Format of GRID, instead of what its first bytes or its name say
     #[arg(long, value_enum, value_name = "FORMAT", help_heading = "Grid")]
     from: Option<GridFormatName>,
@@ -35,6 +37,7 @@ pub(crate) struct GridInput {
 enum GridFormatName {
     Tiff,
     Hgt,
+    Ascii,
     Png,
     Raw,
 }
@@ -74,7 +77,12 @@ const MOST_SAMPLES: usize = 1 << 30;
 impl GridInput {
     /// Its name, for messages.
     pub(crate) fn name(&self) -> String {
-        common::name(&self.grid, "standard input")
+        let name = |p: &PathBuf| common::name(p, "standard input");
+        match &self.grids[..] {
+            [] => String::new(),
+            [one] => name(one),
+            [first, others @ ..] => format!("{} and {} more", name(first), others.len()),
+        }
     }
 
     fn options(&self) -> GridOptions {
@@ -82,6 +90,7 @@ impl GridInput {
         options.format = self.from.map(|f| match f {
             GridFormatName::Tiff => GridFormat::Tiff,
             GridFormatName::Hgt => GridFormat::Hgt,
+            GridFormatName::Ascii => GridFormat::Ascii,
             GridFormatName::Png => GridFormat::Png,
             GridFormatName::Raw => GridFormat::Raw,
         });
@@ -100,18 +109,32 @@ impl GridInput {
 
     /// Opens it: what it says about itself is read, and its heights when asked for.
     pub(crate) fn open(&self, warnings: &mut Warnings) -> Result<GridFile, Failure> {
-        let file = self.name();
-        let grid = files::open_grid(&self.grid, &self.options()).map_err(|e| match e {
-            OpenGridError::Grid(GridError::UnknownFormat) => Failure::Usage(format!(
-                "{file}: neither its first bytes nor its name tell the format; say it with --from tiff|hgt|png|raw"
-            )),
-            OpenGridError::Grid(GridError::RawNeedsSize) => Failure::Usage(format!(
-                "{file}: raw samples need --size and --type, such as --size 1024x1024 --type u16"
-            )),
-            e => Failure::Input(format!("{file}: {e}")),
-        })?;
-        warnings.say(grid.warnings.iter().map(|w| format!("{file}: {w}")));
+        let mut options = self.options();
+        options.cache /= self.grids.len().max(1);
+        let mut files = vec![];
+        for path in &self.grids {
+            let file = common::name(path, "standard input");
+            let grid = files::open_grid(path, &options).map_err(|e| unopened(&file, &e))?;
+            files.push((file, grid));
+        }
+        if let [(file, grid)] = &mut files[..] {
+            grid.warnings.iter_mut().for_each(|w| *w = format!("{file}: {w}"));
+        }
+        let grid = grid::mosaic(files).map_err(|e| Failure::Input(e.to_string()))?;
+        warnings.say(grid.warnings.iter().cloned());
         Ok(grid)
+    }
+}
+
+fn unopened(file: &str, e: &OpenGridError) -> Failure {
+    match e {
+        OpenGridError::Grid(GridError::UnknownFormat) => Failure::Usage(format!(
+            "{file}: neither its first bytes nor its name tell the format; say it with --from tiff|hgt|ascii|png|raw"
+        )),
+        OpenGridError::Grid(GridError::RawNeedsSize) => Failure::Usage(format!(
+            "{file}: raw samples need --size and --type, such as --size 1024x1024 --type u16"
+        )),
+        e => Failure::Input(format!("{file}: {e}")),
     }
 }
 

@@ -3,18 +3,20 @@
 //! [`open`] reads what a file says about itself; its heights come when asked for, as a [`Raster`](crate::terrain::Raster). Nothing is allocated by
 //! an announced size. Errors of decoding name the tile, the row or the line, and begin with the file's name.
 
+mod ascii;
 mod checked;
 mod png;
 mod rows;
 mod samples;
 mod source;
 mod tiff;
+pub mod write;
 
 pub use samples::{ByteOrder, SampleType};
 pub use source::ReadAt;
 
 use super::DecodeError;
-use crate::terrain::{Georeference, Raster};
+use crate::terrain::{Georeference, Mosaic, MosaicError, Part, Raster};
 use std::sync::Arc;
 
 /// A format of grids.
@@ -24,6 +26,8 @@ pub enum GridFormat {
     Tiff,
     /// SRTM's tiles: squares of big-endian 16-bit samples, placed by their names.
     Hgt,
+    /// ESRI ASCII.
+    Ascii,
     /// Grey heights, or colours that code heights.
     Png,
     /// Samples without a head.
@@ -37,17 +41,23 @@ impl GridFormat {
         Some(match extension.to_ascii_lowercase().as_str() {
             "tif" | "tiff" => GridFormat::Tiff,
             "hgt" => GridFormat::Hgt,
+            "asc" | "grd" => GridFormat::Ascii,
             "png" => GridFormat::Png,
             "raw" | "bin" | "r16" | "r32" | "flt" => GridFormat::Raw,
             _ => return None,
         })
     }
 
-    /// The format that a file's first bytes tell of beyond doubt: that of TIFF and PNG.
+    /// The format that a file's first bytes tell of beyond doubt: that of TIFF, PNG and ESRI ASCII.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         match bytes {
             [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => Some(GridFormat::Tiff),
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Some(GridFormat::Png),
+            [head @ .., _]
+                if head.trim_ascii_start().get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"ncols")) =>
+            {
+                Some(GridFormat::Ascii)
+            }
             _ => None,
         }
     }
@@ -57,6 +67,7 @@ impl GridFormat {
         match self {
             GridFormat::Tiff => "tiff",
             GridFormat::Hgt => "hgt",
+            GridFormat::Ascii => "ascii",
             GridFormat::Png => "png",
             GridFormat::Raw => "raw",
         }
@@ -110,6 +121,29 @@ impl Default for GridOptions {
     }
 }
 
+/// Several files of one spacing as one grid: [`Mosaic`]. The first says what the whole is; warnings begin with the files' names.
+///
+/// # Errors
+/// [`MosaicError`], naming the file that does not fit. A single file is given back as it is.
+pub fn mosaic(files: Vec<(String, GridFile)>) -> Result<GridFile, MosaicError> {
+    let mut files = files;
+    if files.len() == 1
+        && let Some((_, file)) = files.pop()
+    {
+        return Ok(file);
+    }
+    let first = &files.first().ok_or(MosaicError::Empty)?.1;
+    let (format, sample, nodata) = (first.format, first.sample, first.nodata);
+    let layout = format!("{} files; the first: {}", files.len(), first.layout);
+    let mut warnings = vec![];
+    let parts = files.into_iter().map(|(name, file)| {
+        warnings.extend(file.warnings.iter().map(|w| format!("{name}: {w}")));
+        Part { name, raster: file.raster, georeference: file.georeference }
+    });
+    let (mosaic, georeference) = Mosaic::new(parts.collect())?;
+    Ok(GridFile { raster: Box::new(mosaic), georeference, format, sample, layout, nodata, warnings })
+}
+
 /// What a decoder found, beside heights.
 struct Facts {
     sample: SampleType,
@@ -153,7 +187,7 @@ impl std::fmt::Debug for GridFile {
 #[non_exhaustive]
 pub enum GridError {
     /// Neither the name, nor the content, nor the caller says what it is.
-    #[error("neither its name nor its first bytes tell the format; say it (tiff, hgt, png, raw)")]
+    #[error("neither its name nor its first bytes tell the format; say it (tiff, hgt, ascii, png, raw)")]
     UnknownFormat,
     /// Raw samples need a size and a type.
     #[error("raw samples need a size and a type")]
@@ -179,6 +213,11 @@ pub fn open(source: Arc<dyn ReadAt>, name: &str, options: &GridOptions) -> Resul
             let (tiff, place, facts) = tiff::open(source, options.cache)?;
             georeference = place;
             (Box::new(tiff), facts)
+        }
+        GridFormat::Ascii => {
+            let (ascii, place, facts) = ascii::open(source, options.cache)?;
+            georeference = place;
+            (Box::new(ascii), facts)
         }
         GridFormat::Png => {
             let (picture, facts) = png::open(source, options.encoding, options.cache)?;

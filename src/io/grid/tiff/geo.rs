@@ -142,3 +142,44 @@ fn crs(keys: GeoKeys) -> Crs {
     let name = [PROJECTED_CITATION, CITATION, GEODETIC_CITATION].into_iter().find_map(|k| text(&keys, k));
     Crs { kind, name, epsg: epsg(PROJECTED_CRS).or_else(|| epsg(GEODETIC_CRS)), keys: Some(keys), wkt: None }
 }
+
+/// Keys for a system that came without any.
+pub(crate) fn plain_keys(g: &Georeference) -> GeoKeys {
+    let raster = match g.sample_at {
+        SampleAt::CellCentre => 1,
+        SampleAt::Point => 2,
+    };
+    let crs = g.crs.clone().unwrap_or_default();
+    let mut entries = vec![[RASTER_TYPE, 0, 1, raster]];
+    let mut ascii = String::new();
+    if let Some(name) = crs.name.filter(|n| n.is_ascii() && n.len() < 1000) {
+        entries.push([CITATION, KEY_ASCII, name.len() as u16 + 1, 0]);
+        ascii = name + "|";
+    }
+    let code = crs.epsg.unwrap_or(USER_DEFINED);
+    match crs.kind {
+        CrsKind::Geographic => {
+            entries.extend([[MODEL_TYPE, 0, 1, 2], [GEODETIC_CRS, 0, 1, code], [ANGULAR_UNITS, 0, 1, 9102]]);
+        }
+        CrsKind::Projected { metres } => {
+            entries.extend([[MODEL_TYPE, 0, 1, 1], [PROJECTED_CRS, 0, 1, code]]);
+            let unit = [9001, 9002, 9003].into_iter().find(|&u| metres_of(u) == Some(metres));
+            entries.push([LINEAR_UNITS, 0, 1, unit.unwrap_or(USER_DEFINED)]);
+            if unit.is_none() {
+                entries.push([LINEAR_UNIT_SIZE, KEY_DOUBLES, 1, 0]);
+                let count = entries.len() as u16;
+                return keys_of(entries, count, vec![metres], ascii);
+            }
+        }
+        CrsKind::Unknown => {}
+    }
+    let count = entries.len() as u16;
+    keys_of(entries, count, vec![], ascii)
+}
+
+/// Sorted, behind their head.
+fn keys_of(mut entries: Vec<[u16; 4]>, count: u16, doubles: Vec<f64>, ascii: String) -> GeoKeys {
+    entries.sort_unstable();
+    let directory = [[1, 1, 0, count]].into_iter().chain(entries).flatten().collect();
+    GeoKeys { directory, doubles, ascii }
+}
