@@ -926,6 +926,83 @@ fn terrain_tin() {
     assert!(regular.step.is_some() && regular.spacing.is_none() && tin.spacing.is_some());
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GeneratedGrid {
+    command: String,
+    name: String,
+    seed: u64,
+    to: String,
+    columns: usize,
+    rows: usize,
+    range: [f64; 2],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TerrainInfo {
+    command: String,
+    file: String,
+    format: String,
+    layout: String,
+    columns: usize,
+    rows: usize,
+    #[serde(rename = "type")]
+    sample: String,
+    #[serde(deserialize_with = "present")]
+    nodata: Option<f64>,
+    void: u64,
+    valid: u64,
+    valid_share: f64,
+    #[serde(deserialize_with = "present")]
+    range: Option<[f64; 2]>,
+    #[serde(deserialize_with = "present")]
+    mean: Option<f64>,
+    #[serde(deserialize_with = "present")]
+    transform: Option<[f64; 6]>,
+    sample_at: String,
+    #[serde(deserialize_with = "present")]
+    spacing: Option<[f64; 2]>,
+    #[serde(deserialize_with = "present")]
+    spacing_metres: Option<[f64; 2]>,
+    #[serde(deserialize_with = "present")]
+    bounds: Option<[[f64; 2]; 2]>,
+    #[serde(deserialize_with = "present")]
+    crs: Option<TerrainCrs>,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TerrainCrs {
+    kind: String,
+    #[serde(deserialize_with = "present")]
+    name: Option<String>,
+    #[serde(deserialize_with = "present")]
+    epsg: Option<u16>,
+    #[serde(deserialize_with = "present")]
+    metres_per_unit: Option<f64>,
+}
+
+#[test]
+fn terrain_info_and_landscapes() {
+    let p = Place::new();
+    let made: GeneratedGrid =
+        serde_json::from_str(&p.done("generate terrain t.tif --size 9 --json").stdout).unwrap();
+    assert_eq!(
+        (made.command.as_str(), made.name.as_str(), made.columns, made.rows),
+        ("generate", "terrain", 9, 9)
+    );
+    let info: TerrainInfo = serde_json::from_str(&p.done("terrain info t.tif --json").stdout).unwrap();
+    assert_eq!((info.command.as_str(), info.valid, info.valid_share), ("terrain info", 81, 1.0));
+    assert_eq!(info.range.unwrap().map(|h| h as f32), made.range.map(|h| h as f32));
+    let crs = info.crs.unwrap();
+    assert_eq!(
+        (crs.kind.as_str(), crs.metres_per_unit, info.sample_at.as_str()),
+        ("projected", Some(1.0), "point")
+    );
+}
+
 #[test]
 fn every_field_is_documented() {
     let documentation = include_str!("../docs/json.md");
@@ -948,6 +1025,8 @@ fn every_field_is_documented() {
         "clip torus.obj out.ply --plane 0,1,0,0 --cap --json",
         "cull torus.obj out.ply --camera cam.json --json",
         "generate sphere s.ply --faces 20 --json",
+        "generate terrain t.tif --size 9 --json",
+        "terrain info t.tif --json",
         TERRAIN,
     ];
     for object in others.map(|a| p.done(a).json()).into_iter().chain([simplified]) {

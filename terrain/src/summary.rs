@@ -18,21 +18,22 @@ pub struct Summary {
 /// Samples read at once: 8 MiB.
 const AT_ONCE: usize = 1 << 20;
 
-/// Windows over a raster, each of whole blocks where a block has not far more than `at_once` samples: row of windows after row.
-pub fn windows(raster: &dyn Raster, at_once: usize) -> Vec<Window> {
+/// Windows over a raster, row of windows after row, each of whole blocks where a block has no more than `at_once` samples. None has more
+/// than `at_once`, or 1.
+pub fn windows(raster: &dyn Raster, at_once: usize) -> impl Iterator<Item = Window> + use<> {
     let (columns, rows) = (raster.columns(), raster.rows());
     let [w, h] = raster.block().map(|n| n.max(1));
-    // As many blocks beside each other as fit, and then rows of them; a block may have more rows than should be read at once.
-    let high = h.min((at_once / w.min(columns)).max(1));
+    let at_once = at_once.max(1);
+    // As many blocks beside each other as fit, then rows of them; of a block that is too large, parts.
+    let w = w.min(columns).min(at_once);
+    let high = h.min(at_once / w).max(1);
     let wide = (at_once / high / w).max(1).saturating_mul(w).min(columns);
     let high = if wide == columns { (at_once / wide / high).max(1).saturating_mul(high) } else { high };
-    let mut windows = vec![];
-    for row in (0..rows).step_by(high) {
-        for column in (0..columns).step_by(wide) {
-            windows.push(Window::new(column, row, wide.min(columns - column), high.min(rows - row)));
-        }
-    }
-    windows
+    (0..rows).step_by(high).flat_map(move |row| {
+        (0..columns)
+            .step_by(wide)
+            .map(move |column| Window::new(column, row, wide.min(columns - column), high.min(rows - row)))
+    })
 }
 
 impl Summary {
@@ -122,10 +123,14 @@ mod tests {
             ([10, 7], [4, 4], 1000),
             ([1, 1], [256, 256], 5),
             ([10, 7], [10, 7], 20),
+            ([10, 7], [10, 1], 4),
+            ([10, 7], [1 << 40, 1 << 40], 30),
         ] {
             let mut count = vec![0; size[0] * size[1]];
             for w in windows(&Blocks(size, block), at_once) {
-                assert!(w.column % block[0] == 0 && (w.row % block[1] == 0 || block[0] * block[1] > at_once));
+                let fits = block[0] * block[1] <= at_once;
+                assert!(w.columns * w.rows <= at_once);
+                assert!(!fits || w.column.is_multiple_of(block[0]) && w.row.is_multiple_of(block[1]));
                 for row in w.row..w.row + w.rows {
                     count[row * size[0] + w.column..][..w.columns].iter_mut().for_each(|c| *c += 1);
                 }

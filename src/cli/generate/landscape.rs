@@ -2,11 +2,13 @@
 
 use crate::cli::Failure;
 use crate::cli::common::thousands;
+use crate::cli::control::Interrupt;
 use progmesh::io::files;
 use progmesh::io::grid::GridFormat;
 use progmesh::io::grid::write::{self, GridHead, WriteGridError};
 use progmesh::meshes::{LANDSCAPE_SIDE, Landscape, MAX_FACES, Sample, sheet};
 use progmesh::terrain::{Affine, Crs, CrsKind, Georeference, SampleAt};
+use std::io::ErrorKind;
 use std::path::Path;
 
 /// Samples along the side of a grid, if none are asked for.
@@ -50,16 +52,23 @@ pub(super) fn write(path: &Path, format: GridFormat, size: usize, seed: u64) -> 
             ..Default::default()
         }),
     };
+    let interrupt = Interrupt::watch();
+    interrupt.be_graceful();
     let mut landscape = Landscape::new(size, seed);
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     let head = GridHead { columns: size, rows: size, georeference: &georeference };
     let mut row = |r: usize, out: &mut [f64]| {
+        if interrupt.is_set() {
+            return Err(ErrorKind::Other.into());
+        }
         landscape.row(r, out);
         let [least, greatest] = &mut range;
         (*least, *greatest) = out.iter().fold((*least, *greatest), |(l, g), &h| (l.min(h), g.max(h)));
+        Ok(())
     };
     files::write_with(path, |out| write::write(format, &head, &mut row, out)).map_err(|e| match e {
-        WriteGridError::Io(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Failure::BrokenPipe,
+        _ if interrupt.is_set() => Failure::Interrupted,
+        WriteGridError::Io(e) if e.kind() == ErrorKind::BrokenPipe => Failure::BrokenPipe,
         e => Failure::Output(format!("{}: {e}", path.display())),
     })?;
     Ok(range)

@@ -156,9 +156,11 @@ impl Picture {
             Some(u) => u,
             None => start(&self.source).map_err(|e| wrong(0, e))?,
         };
-        let mut out = vec![f64::NAN; rows * self.columns];
+        // Grows with the rows that are there.
+        let mut out = vec![];
         if self.interlaced {
             let size = at.reader.output_buffer_size().unwrap_or(0);
+            out.resize(rows * self.columns, f64::NAN);
             let mut pixels = vec![0; size];
             at.reader.next_frame(&mut pixels).map_err(|e| wrong(0, e.to_string()))?;
             self.heights(&pixels, &mut out);
@@ -168,7 +170,8 @@ impl Picture {
             let row = at.reader.next_row().map_err(|e| wrong(at.row, e.to_string()))?;
             let Some(row) = row else { return Err(wrong(at.row, "the file ends before".into())) };
             if let Some(r) = at.row.checked_sub(first) {
-                self.heights(row.data(), &mut out[r * self.columns..(r + 1) * self.columns]);
+                out.resize((r + 1) * self.columns, f64::NAN);
+                self.heights(row.data(), &mut out[r * self.columns..]);
             }
             at.row += 1;
         }

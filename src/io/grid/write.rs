@@ -16,6 +16,9 @@ pub struct GridHead<'a> {
     pub georeference: &'a Georeference,
 }
 
+/// Writes the heights of a row, of this number, to a slice; what fails ends the writing.
+pub type Row<'a> = dyn FnMut(usize, &mut [f64]) -> io::Result<()> + 'a;
+
 /// Why a grid could not be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -38,11 +41,11 @@ const VOID: f32 = -9999.0;
 /// PNG and HGT hold whole numbers: heights are rounded, and those outside 0 to 65,535 (-32,767 to 32,767) become the nearest of them.
 ///
 /// # Errors
-/// [`WriteGridError`] for a size that the format cannot hold, and what `out` gives.
+/// [`WriteGridError`] for a size that the format cannot hold, and what `row` and `out` give.
 pub fn write(
     format: GridFormat,
     head: &GridHead<'_>,
-    row: &mut dyn FnMut(usize, &mut [f64]),
+    row: &mut Row<'_>,
     out: &mut dyn Write,
 ) -> Result<(), WriteGridError> {
     if head.columns == 0 || head.rows == 0 {
@@ -64,13 +67,13 @@ pub fn write(
 
 fn samples<const N: usize>(
     head: &GridHead<'_>,
-    row: &mut dyn FnMut(usize, &mut [f64]),
+    row: &mut Row<'_>,
     out: &mut dyn Write,
     coded: impl Fn(f64) -> [u8; N],
 ) -> io::Result<()> {
     let (mut heights, mut bytes) = (vec![0.0; head.columns], vec![]);
     for r in 0..head.rows {
-        row(r, &mut heights);
+        row(r, &mut heights)?;
         bytes.clear();
         bytes.extend(heights.iter().flat_map(|&h| coded(h)));
         out.write_all(&bytes)?;
@@ -78,11 +81,7 @@ fn samples<const N: usize>(
     Ok(())
 }
 
-fn png(
-    head: &GridHead<'_>,
-    row: &mut dyn FnMut(usize, &mut [f64]),
-    out: &mut dyn Write,
-) -> Result<(), WriteGridError> {
+fn png(head: &GridHead<'_>, row: &mut Row<'_>, out: &mut dyn Write) -> Result<(), WriteGridError> {
     let side = |n: usize| u32::try_from(n).ok().filter(|&n| n <= i32::MAX as u32);
     let too_large = || WriteGridError::CannotHold("PNG has at most 2147483647 columns and rows".into());
     let (width, height) = side(head.columns).zip(side(head.rows)).ok_or_else(too_large)?;
@@ -99,11 +98,7 @@ fn png(
     stream.finish().map_err(failed)
 }
 
-fn ascii(
-    head: &GridHead<'_>,
-    row: &mut dyn FnMut(usize, &mut [f64]),
-    out: &mut dyn Write,
-) -> Result<(), WriteGridError> {
+fn ascii(head: &GridHead<'_>, row: &mut Row<'_>, out: &mut dyn Write) -> Result<(), WriteGridError> {
     let t = head.georeference.transform.unwrap_or(Affine::north_up([0.0, (head.rows - 1) as f64], [1.0; 2]));
     let [a, b, _, c, d, _] = t.0;
     if b != 0.0 || c != 0.0 || a <= 0.0 || (a + d).abs() > 1e-9 * a {
@@ -122,7 +117,7 @@ fn ascii(
     )?;
     let (mut heights, mut line) = (vec![0.0; columns], String::new());
     for r in 0..rows {
-        row(r, &mut heights);
+        row(r, &mut heights)?;
         line.clear();
         for &h in &heights {
             // The shortest text that reads as the same f32, as GeoTIFF would hold it.
@@ -206,11 +201,7 @@ fn tags(head: &GridHead<'_>) -> Vec<(u16, Value)> {
 }
 
 /// Tiles that are not packed, so that their places are known before the first is written; BigTIFF where 4 GiB do not suffice.
-fn tiff(
-    head: &GridHead<'_>,
-    row: &mut dyn FnMut(usize, &mut [f64]),
-    out: &mut dyn Write,
-) -> Result<(), WriteGridError> {
+fn tiff(head: &GridHead<'_>, row: &mut Row<'_>, out: &mut dyn Write) -> Result<(), WriteGridError> {
     if head.columns > i32::MAX as usize || head.rows > i32::MAX as usize {
         return Err(WriteGridError::CannotHold("TIFF has at most 2147483647 columns and rows".into()));
     }
@@ -240,7 +231,7 @@ fn tiff(
     let mut bytes = vec![];
     for top in (0..head.rows).step_by(TILE) {
         for r in 0..TILE.min(head.rows - top) {
-            row(top + r, &mut heights);
+            row(top + r, &mut heights)?;
             for (line, tile) in heights.chunks(TILE).zip(band.chunks_exact_mut(TILE * TILE)) {
                 for (to, &h) in tile[r * TILE..].iter_mut().zip(line) {
                     *to = if h.is_nan() { VOID } else { h as f32 };
