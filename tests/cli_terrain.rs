@@ -130,3 +130,15 @@ fn a_landscape_is_the_same_in_every_format() {
     p.run("generate torus c.tif").failed(2, "--to");
     assert!(!p.exists("c.tif") && !p.exists("c.obj"));
 }
+
+#[test]
+fn the_landscape_is_as_rough_as_it_shall_be() {
+    let p = Place::new();
+    let made = p.done("generate terrain a.tif --size 2049 --seed 1 --json -q").json();
+    let range = made["range"][1].as_f64().unwrap() - made["range"][0].as_f64().unwrap();
+    let error = range / 150.0;
+    let tin =
+        p.done(&format!("terrain tin a.tif a.ply --method greedy --max-error {error} --json -q")).json();
+    let triangles = tin["triangles"].as_u64().unwrap();
+    assert!((150_000..220_000).contains(&triangles), "{triangles}");
+}

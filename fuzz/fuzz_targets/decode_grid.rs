@@ -16,7 +16,8 @@ fuzz_target!(|bytes: &[u8]| {
             1 => GridFormat::Ascii,
             _ => GridFormat::Raw,
         });
-        (options.size, options.sample) = (Some([bytes.len() / 2, 1]), Some((SampleType::I16, ByteOrder::Big)));
+        (options.size, options.sample) =
+            (Some([bytes.len() / 2, 1]), Some((SampleType::I16, ByteOrder::Big)));
     }
     if let Ok(file) = grid::open(Arc::new(bytes.to_vec()), "N01E001", &options) {
         let (columns, rows) = (file.raster.columns(), file.raster.rows());

@@ -9,7 +9,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Samples of a band of rows that are unpacked at once, about.
 const BAND: usize = 1 << 20;
 /// The most bytes an interlaced picture may have, which can only be unpacked whole.
-const MOST_INTERLACED: usize = 256 << 20;
+const MOST_INTERLACED: usize = 64 << 20;
+/// The most columns: a row is the least that is unpacked.
+const MOST_COLUMNS: usize = 1 << 22;
 
 /// A picture of heights.
 pub(super) struct Picture {
@@ -56,6 +58,9 @@ pub(super) fn open(
     let info = unpacking.reader.info();
     let (columns, rows) = (info.width as usize, info.height as usize);
     let (color, depth, interlaced) = (info.color_type, info.bit_depth, info.interlaced);
+    if columns > MOST_COLUMNS {
+        return Err(wrong(format!("{columns} columns; at most {MOST_COLUMNS} are read")));
+    }
     let colored = matches!(color, ColorType::Rgb | ColorType::Rgba);
     let wide = match depth {
         BitDepth::Eight => false,
@@ -160,9 +165,9 @@ impl Picture {
         let mut out = vec![];
         if self.interlaced {
             let size = at.reader.output_buffer_size().unwrap_or(0);
-            out.resize(rows * self.columns, f64::NAN);
             let mut pixels = vec![0; size];
             at.reader.next_frame(&mut pixels).map_err(|e| wrong(0, e.to_string()))?;
+            out.resize(rows * self.columns, f64::NAN);
             self.heights(&pixels, &mut out);
             return Ok(out);
         }
