@@ -48,6 +48,18 @@ fn every_method_keeps_the_error_and_the_check_agrees() {
 }
 
 #[test]
+fn the_surface_contract_holds_between_samples() {
+    let p = place();
+    for how in ["", "--on-samples", "--method greedy", "--method regular"] {
+        let report = tin(&p, &format!("out.ply --max-error 6 --error surface {how}"));
+        assert_eq!((&report["contract"], &report["verified"]["good"]), (&"surface".into(), &true.into()));
+        let [own, separate] =
+            [&report["error"]["surface"], &report["verified"]["surface_max"]].map(|v| v.as_f64().unwrap());
+        assert!(own <= 6.0 && (own - separate).abs() < 1e-9, "{how}: {own} {separate}");
+    }
+}
+
+#[test]
 fn a_count_is_kept_and_an_outline_that_needs_more_is_said() {
     let p = place();
     let report = tin(&p, "few.ply --triangles 200");

@@ -855,6 +855,7 @@ struct TerrainTin {
     on_samples: bool,
     #[serde(deserialize_with = "present")]
     max_error: Option<f64>,
+    contract: String,
     #[serde(deserialize_with = "present")]
     max_triangles: Option<usize>,
     triangles: usize,
@@ -878,6 +879,7 @@ struct TerrainTin {
 struct TerrainError {
     max: f64,
     rms: f64,
+    surface: f64,
 }
 
 #[derive(Deserialize)]
@@ -887,6 +889,9 @@ struct TerrainVerified {
     exact: bool,
     max: f64,
     beyond: usize,
+    #[serde(deserialize_with = "present")]
+    surface_max: Option<f64>,
+    pieces_beyond: usize,
     uncovered: usize,
     over_void: usize,
     turned: usize,

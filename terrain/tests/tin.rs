@@ -1,14 +1,20 @@
 //! Networks of small grids, checked by code that shares nothing with what makes them.
 
 use progmesh_terrain::Grid;
-use progmesh_terrain::tin::{Made, Method, Options, Quiet, TinError, triangulate, verify};
+use progmesh_terrain::tin::{Contract, Made, Method, Options, Quiet, TinError, triangulate, verify};
 use proptest::prelude::*;
 
 const METHODS: [Method; 4] = [Method::Regular, Method::Greedy, Method::Decimation, Method::Best];
 
 fn make(grid: &Grid, options: &Options) -> Made {
     let made = triangulate(grid, options, &Quiet).unwrap();
-    let verdict = verify(grid, &made.tin, options.max_error.unwrap_or(f64::INFINITY));
+    let verdict = verify(grid, &made.tin, options.max_error.unwrap_or(f64::INFINITY), options.contract);
+    let surface = verify(grid, &made.tin, f64::INFINITY, Contract::Surface).surface_error;
+    assert!(
+        surface <= made.errors.surface + 1e-9 && made.errors.surface <= surface + 1e-3,
+        "{options:?}: {surface} {:?}",
+        made.errors
+    );
     assert!(verdict.is_good() && verdict.exact, "{options:?}: {verdict:?}");
     assert!((verdict.max_error - made.errors.max).abs() <= 1e-9 * verdict.max_error.max(1.0));
     assert_eq!(verdict.isolated, made.isolated);
@@ -50,9 +56,17 @@ proptest! {
         // Tenths are no multiples of a quantum: what rounding takes must be left.
         let error = f64::from(tenths) / 10.0 + 1e-3;
         for method in METHODS {
-            for on_samples in [false, true] {
-                let options =
-                    Options::default().with_max_error(error).with_method(method).with_on_samples(on_samples);
+            for (on_samples, contract) in [
+                (false, Contract::Samples),
+                (true, Contract::Samples),
+                (false, Contract::Surface),
+                (true, Contract::Surface),
+            ] {
+                let options = Options::default()
+                    .with_max_error(error)
+                    .with_method(method)
+                    .with_on_samples(on_samples)
+                    .with_contract(contract);
                 match triangulate(&grid, &options, &Quiet) {
                     Ok(_) => drop(make(&grid, &options)),
                     Err(e) => prop_assert_eq!(e, TinError::Nothing),
@@ -72,6 +86,22 @@ fn the_best_takes_far_fewer_triangles_than_greedy_insertion() {
         let on_samples = make(&grid, &options.with_on_samples(true)).tin.triangles.len();
         assert!(best * 100 <= greedy * 65, "{error}: {best} of {greedy}");
         assert!(on_samples * 100 <= greedy * 75, "{error}: {on_samples} of {greedy}");
+    }
+}
+
+#[test]
+fn the_surface_is_kept_between_samples() {
+    let grid = rough(90, 70);
+    for method in METHODS {
+        let options = Options::default().with_max_error(3.0).with_method(method);
+        let loose = make(&grid, &options);
+        let kept = make(&grid, &options.with_contract(Contract::Surface));
+        assert!(kept.errors.surface <= 3.0, "{method:?}: {:?}", kept.errors);
+        assert!(
+            method == Method::Regular || loose.errors.surface > 3.0,
+            "{method:?}: nothing was asked of it"
+        );
+        assert!(kept.tin.triangles.len() < 3 * loose.tin.triangles.len());
     }
 }
 
@@ -143,7 +173,7 @@ fn what_cannot_be_is_said() {
     assert_eq!(make(&all(1e30), &Options::default().with_max_error(1e24)).tin.triangles.len(), 2);
     // 1e30 and 0.1 together take more bits than the exact check has.
     let made = triangulate(&spike, &Options::default().with_max_error(1e29), &Quiet).unwrap();
-    let verdict = verify(&spike, &made.tin, 1e29);
+    let verdict = verify(&spike, &made.tin, 1e29, Contract::Samples);
     assert!(verdict.is_good() && !verdict.exact, "{verdict:?}");
 }
 

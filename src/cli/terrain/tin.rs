@@ -12,14 +12,14 @@ use progmesh::io::Format;
 use progmesh::io::grid::GridFile;
 use progmesh::simplify::Control;
 use progmesh::terrain::Grid;
-use progmesh::terrain::tin::{self, Made, Method, Options, TinError, Verdict};
+use progmesh::terrain::tin::{self, Contract, Made, Method, Options, TinError, Verdict};
 use serde::Serialize;
 use serde_json::json;
 use std::time::Instant;
 
 /// Make few triangles of a height grid, none of its samples farther from them than an error.
 ///
-/// The error is vertical, in the grid's units, and holds exactly for the coordinates as they are written: every valid sample is looked at, in
+/// The error is vertical, in the grid's units, and holds at the samples (--error surface: between them too), exactly, for the coordinates as they are written: every valid sample is looked at, in
 /// integers. Voids stay open: the surface is that of the grid triangles of three valid samples, with the same outline. Vertices lie at
 /// samples; their heights are free within the error, unless --on-samples keeps them.
 #[derive(clap::Args, Debug)]
@@ -42,6 +42,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "E", value_parser = args::not_negative, allow_negative_numbers = true,
           required_unless_present = "triangles", help_heading = "Target")]
     max_error: Option<f64>,
+    /// Where the error holds
+    #[arg(long, value_enum, default_value_t = ContractName::Samples, help_heading = "Target")]
+    error: ContractName,
     /// At most this many triangles, with about the least error; with --max-error, where that would take more
     #[arg(long, value_name = "N", value_parser = args::positive, allow_negative_numbers = true,
           help_heading = "Target")]
@@ -112,6 +115,30 @@ impl MethodName {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ContractName {
+    /// At every valid sample
+    Samples,
+    /// Between samples too, against the grid's own triangles (diagonals from x, y to x + 1, y + 1)
+    Surface,
+}
+
+impl ContractName {
+    fn contract(self) -> Contract {
+        match self {
+            ContractName::Samples => Contract::Samples,
+            ContractName::Surface => Contract::Surface,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            ContractName::Samples => "samples",
+            ContractName::Surface => "surface",
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum SpaceName {
     /// x = column, y = row, z = height
     Grid,
@@ -159,8 +186,9 @@ impl Args {
             let make = making.elapsed().as_secs_f64();
             warnings.say(isolated(&made).map(|w| format!("{file}: {w}")));
             let verifying = Instant::now();
-            let verdict =
-                self.verify.then(|| tin::verify(&grid, &made.tin, self.max_error.unwrap_or(f64::INFINITY)));
+            let verdict = self.verify.then(|| {
+                tin::verify(&grid, &made.tin, self.max_error.unwrap_or(f64::INFINITY), self.error.contract())
+            });
             let verify = verifying.elapsed().as_secs_f64();
             if interrupt.is_set() {
                 return Err(Failure::Interrupted);
@@ -191,8 +219,10 @@ impl Args {
     }
 
     fn options(&self) -> Options {
-        let mut options =
-            Options::default().with_method(self.method.method()).with_on_samples(self.on_samples);
+        let mut options = Options::default()
+            .with_method(self.method.method())
+            .with_on_samples(self.on_samples)
+            .with_contract(self.error.contract());
         (options.max_error, options.triangles) = (self.max_error, self.triangles);
         options
     }
@@ -247,12 +277,13 @@ impl Args {
             method: self.method.name(),
             on_samples: self.on_samples || self.method != MethodName::Best,
             max_error: self.max_error,
+            contract: self.error.name(),
             max_triangles: self.triangles,
             triangles: made.tin.triangles.len(),
             vertices: made.tin.points.len(),
-            error: ErrorReport { max: made.errors.max, rms: made.errors.rms },
+            error: ErrorReport { max: made.errors.max, rms: made.errors.rms, surface: made.errors.surface },
             step: made.step,
-            verified: verdict.map(Verified::of),
+            verified: verdict.map(|v| Verified::of(v, self.error)),
             space,
             spacing,
             exaggeration,
@@ -363,6 +394,7 @@ struct Report {
     method: &'static str,
     on_samples: bool,
     max_error: Option<f64>,
+    contract: &'static str,
     max_triangles: Option<usize>,
     triangles: usize,
     vertices: usize,
@@ -380,6 +412,7 @@ struct Report {
 struct ErrorReport {
     max: f64,
     rms: f64,
+    surface: f64,
 }
 
 #[derive(Serialize)]
@@ -388,6 +421,8 @@ struct Verified {
     exact: bool,
     max: f64,
     beyond: usize,
+    surface_max: Option<f64>,
+    pieces_beyond: usize,
     uncovered: usize,
     over_void: usize,
     turned: usize,
@@ -396,12 +431,14 @@ struct Verified {
 }
 
 impl Verified {
-    fn of(v: &Verdict) -> Self {
+    fn of(v: &Verdict, contract: ContractName) -> Self {
         Verified {
             good: v.is_good(),
             exact: v.exact,
             max: v.max_error,
             beyond: v.beyond,
+            surface_max: (contract == ContractName::Surface).then_some(v.surface_error),
+            pieces_beyond: v.pieces_beyond,
             uncovered: v.uncovered,
             over_void: v.over_void,
             turned: v.turned,
@@ -431,13 +468,14 @@ impl Report {
             None => "",
         };
         format!(
-            "{}: {} x {} samples -> {} triangles, error {} (rms {}){verified}; {}{step}, {:.3} s (read {:.3}, make {:.3}, write {:.3})",
+            "{}: {} x {} samples -> {} triangles, error {} (rms {}, between samples {}){verified}; {}{step}, {:.3} s (read {:.3}, make {:.3}, write {:.3})",
             self.file,
             thousands(self.columns),
             thousands(self.rows),
             thousands(self.triangles),
             short(self.error.max),
             short(self.error.rms),
+            short(self.error.surface),
             self.method,
             t.total,
             t.read,

@@ -1,11 +1,11 @@
 //! A network improved block by block: vertices that several blocks share stay, and the next pass has its blocks elsewhere.
 
 use super::Control;
-use super::field::{Field, Tolerance};
+use super::field::Field;
 use super::network::Network;
 use super::parallel;
-use super::patch::{NONE, Patch, Vertex};
-use super::scan::{Corner, farthest};
+use super::patch::{NONE, Patch, Rules, Vertex};
+use super::scan::keeps;
 use super::thin::Scratch;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -18,7 +18,7 @@ const TRIANGLES: usize = 3000;
 pub(super) struct Pass {
     /// How far the blocks are shifted, in parts of their size.
     pub shift: f64,
-    pub free_heights: bool,
+    pub rules: Rules,
     /// Where this pass begins and ends in the whole, for the progress.
     pub done: [f64; 2],
 }
@@ -38,13 +38,7 @@ struct Improved {
 
 impl Network {
     /// Improves all blocks; `None` when cancelled. The same result for any number of threads.
-    pub(super) fn improve(
-        &mut self,
-        field: &Field,
-        tolerance: Tolerance,
-        pass: Pass,
-        control: &dyn Control,
-    ) -> Option<()> {
+    pub(super) fn improve(&mut self, field: &Field, pass: Pass, control: &dyn Control) -> Option<()> {
         let mut uses = vec![0u32; self.vertices.len()];
         for &v in self.triangles.as_flattened() {
             uses[v as usize] += 1;
@@ -55,7 +49,7 @@ impl Network {
             if control.cancelled() {
                 return None;
             }
-            let improved = self.improve_block(field, tolerance, pass.free_heights, block, &uses);
+            let improved = self.improve_block(field, pass.rules, block, &uses);
             let part = (finished.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64;
             control.progress(pass.done[0] + part * (pass.done[1] - pass.done[0]));
             Some(improved)
@@ -101,14 +95,7 @@ impl Network {
         blocks
     }
 
-    fn improve_block(
-        &self,
-        field: &Field,
-        tolerance: Tolerance,
-        free_heights: bool,
-        block: Block,
-        uses: &[u32],
-    ) -> Improved {
+    fn improve_block(&self, field: &Field, rules: Rules, block: Block, uses: &[u32]) -> Improved {
         let mut inside = vec![0u32; block.vertices.len()];
         for &v in block.triangles.as_flattened() {
             inside[v as usize] += 1;
@@ -119,16 +106,14 @@ impl Network {
             locked: inside[i] != uses[v as usize],
         };
         let vertices = block.vertices.iter().enumerate().map(vertex).collect();
-        let mut patch = Patch::new(field, tolerance, vertices, block.triangles.clone(), free_heights);
+        let mut patch = Patch::new(field, rules, vertices, block.triangles.clone());
         patch.improve(&mut Scratch::default());
         let heights = patch.vertices.iter().map(|v| v.at.z).collect();
         patch.triangles.retain(|t| t[0] != NONE);
         // Steps are found in floating point, with a margin; this is the proof. A block that fails stays as it was.
         let corner = |v: u32| patch.vertices[v as usize].at;
-        let proven = patch.triangles.iter().all(|t| {
-            let [a, b, c]: [Corner; 3] = t.map(corner);
-            farthest(field, a, b, c).within(tolerance)
-        });
+        let keeps = |t: &[u32; 3]| keeps(field, rules.tolerance, rules.surface, t.map(corner));
+        let proven = patch.triangles.iter().all(keeps);
         debug_assert!(proven);
         if proven {
             return Improved { block: Block { triangles: patch.triangles, ..block }, heights };

@@ -1,18 +1,18 @@
 //! How well triangles lie on the samples, and the triangulation of a hole that lies best.
 
 use super::patch::{MOST_CORNERS, Patch};
-use super::scan::{Corner, Plane, rows};
+use super::scan::{Corner, Plane, crossings, rows};
 
 impl Patch<'_> {
     /// Energy of a triangle: the sum over its samples of a power of error over tolerance; `None` where one is beyond the tolerance
     /// or the triangle does not turn to the left.
     #[inline]
-    pub(super) fn energy(&self, a: Corner, b: Corner, c: Corner) -> Option<f64> {
+    pub(super) fn energy(&self, a: Corner, b: Corner, c: Corner, bound: f64) -> Option<f64> {
         let plane = Plane::new(a, b, c);
         if plane.area <= 0 {
             return None;
         }
-        let most = self.tolerance.over(plane.area);
+        let most = self.rules.tolerance.over(plane.area);
         let scale = self.scale / plane.area as f64;
         let columns = self.field.columns as usize;
         let (mut sum, mut good) = (0.0, true);
@@ -30,8 +30,17 @@ impl Patch<'_> {
                 sum += (r * r) * (r * r);
                 s += plane.dx;
             }
-            good = greatest <= most;
+            good = greatest <= most && sum < bound;
         });
+        if good && self.rules.surface {
+            for (p, q) in [(a, b), (b, c), (c, a)] {
+                crossings(self.field, p, q, |c| {
+                    good &= c.miss.abs() <= self.rules.tolerance.over(c.parts);
+                    let r = c.miss as f64 / c.parts as f64 * self.scale;
+                    sum += (r * r) * (r * r);
+                });
+            }
+        }
         good.then_some(sum)
     }
 
@@ -55,7 +64,7 @@ impl Patch<'_> {
                     if below >= best[i][k] {
                         continue;
                     }
-                    if let Some(e) = self.energy(hole[i], hole[j], hole[k])
+                    if let Some(e) = self.energy(hole[i], hole[j], hole[k], best[i][k] - below)
                         && below + e < best[i][k]
                     {
                         best[i][k] = below + e;

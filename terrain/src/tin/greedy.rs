@@ -5,12 +5,14 @@ use super::delaunay::Triangulation;
 use super::field::{Field, Tolerance};
 use super::queue::Buckets;
 use super::region::Region;
-use super::scan::{Corner, farthest};
+use super::scan::{Corner, Crossing, crossings, farthest};
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Goal {
     pub tolerance: Tolerance,
+    /// Whether the tolerance holds between samples too.
+    pub surface: bool,
     /// At most this many triangles, unless the outline needs more.
     pub triangles: usize,
 }
@@ -30,7 +32,62 @@ pub(super) fn greedy(
     let mut mesh = Triangulation::new(field.columns, field.rows);
     region.constrain(&mut mesh);
     refine(field, &mut mesh, goal, control)?;
+    while goal.surface && mend(field, &mut mesh, goal) {
+        refine(field, &mut mesh, goal, control)?;
+    }
     Some(mesh)
+}
+
+/// Inserts a sample beside where a side leaves the tolerance most, for every triangle that has such a side; false if none has.
+///
+/// It ends: sides of a unit between two vertices are always there, so whatever crosses one has an end that is no vertex yet; where a
+/// cell of four vertices has the wrong diagonal, that is turned.
+fn mend(field: &Field, mesh: &mut Triangulation, goal: Goal) -> bool {
+    let mut is_vertex = vec![false; field.h.len()];
+    for &(x, y) in &mesh.points {
+        is_vertex[field.index(x, y)] = true;
+    }
+    let at = |sample: u32| {
+        let columns = field.columns as usize;
+        ((sample as usize % columns) as i32, (sample as usize / columns) as i32)
+    };
+    let (mut samples, mut diagonals) = (vec![], vec![]);
+    let mut inside = 0;
+    for t in (0..mesh.triangles() as u32).filter(|&t| !mesh.is_outside(t)) {
+        inside += 1;
+        let corners = mesh.corners(t).map(|v| {
+            let (x, y) = mesh.points[v as usize];
+            Corner { x, y, z: field.at(x, y) }
+        });
+        let mut worst: Option<Crossing> = None;
+        for i in 0..3 {
+            crossings(field, corners[i], corners[(i + 1) % 3], |c| {
+                let beyond = c.miss.abs() > goal.tolerance.over(c.parts);
+                let size = |c: &Crossing| i128::from(c.miss.abs());
+                let worse = |w: Crossing| size(&c) * i128::from(w.parts) > size(&w) * i128::from(c.parts);
+                if beyond && worst.is_none_or(worse) {
+                    worst = Some(c);
+                }
+            });
+        }
+        let Some(crossing) = worst else { continue };
+        match crossing.ends.into_iter().find(|&s| !is_vertex[s as usize]) {
+            Some(sample) => samples.push(sample),
+            None => diagonals.push(crossing.ends),
+        }
+    }
+    samples.sort_unstable();
+    samples.dedup();
+    let room = goal.triangles.saturating_sub(inside) / 2;
+    samples.truncate(room);
+    let changes = !samples.is_empty() || !diagonals.is_empty() && room > 0;
+    for sample in samples {
+        mesh.insert(at(sample));
+    }
+    for [a, b] in diagonals {
+        mesh.turn_diagonal(at(a), at(b));
+    }
+    changes
 }
 
 /// The same, of a triangulation that is there: what its `changed` lists is looked at first.

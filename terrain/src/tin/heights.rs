@@ -1,12 +1,12 @@
 //! Heights of vertices, moved within what the samples around allow.
 
 use super::patch::{Patch, Ring};
-use super::scan::{Plane, rows};
+use super::scan::{Plane, crossings, rows};
 
 impl Patch<'_> {
     /// Moves a vertex up or down to where the energy around it is least, within the tolerance. True if it moved.
     pub(super) fn relax(&mut self, v: u32, ring: &mut Ring, samples: &mut Samples) -> bool {
-        if self.vertices[v as usize].locked || !self.free_heights {
+        if self.vertices[v as usize].locked || !self.rules.free_heights {
             return false;
         }
         self.ring(v, ring);
@@ -39,7 +39,15 @@ impl Patch<'_> {
                 }));
             });
         }
-        let d = samples.best_step(self.tolerance.quanta() as f32);
+        if self.rules.surface {
+            for &u in &ring.vertices {
+                crossings(self.field, at, self.corner(u), |c| {
+                    let parts = c.parts as f64;
+                    samples.push((c.miss as f64 / parts) as f32, ((c.parts - c.part) as f64 / parts) as f32);
+                });
+            }
+        }
+        let d = samples.best_step(self.rules.tolerance.quanta() as f32);
         self.vertices[v as usize].at.z += d;
         d != 0
     }

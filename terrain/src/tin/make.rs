@@ -4,13 +4,15 @@ use super::blocks::Pass;
 use super::field::{Field, Tolerance};
 use super::greedy::{Goal, greedy};
 use super::network::Network;
-use super::options::{Control, Made, Method, Options, Tin, TinError};
+use super::options::{Contract, Control, Made, Method, Options, Tin, TinError};
+use super::patch::Rules;
 use super::region::Region;
 use super::regular::regular;
 use crate::Grid;
 
-/// Where the blocks of a pass lie: shifted so that what one pass locked is free in the next.
-const SHIFTS: [f64; 3] = [0.0, 0.5, 0.25];
+/// Where the blocks of a pass lie: shifted so that what one pass locked is free in the next. A third pass takes 1.3 % more triangles away, and
+/// a quarter more time (fuji, grandcanyon, N57E011).
+const SHIFTS: [f64; 2] = [0.0, 0.5];
 
 /// Makes a network of a grid.
 ///
@@ -86,7 +88,8 @@ impl Work<'_> {
         let field = self.field;
         let exact = field.tolerance(field.rounding).unwrap_or_default();
         let share = if options.method == Method::Greedy { 1.0 } else { SHARE };
-        let goal = Goal { tolerance: exact, triangles: (most as f64 / share) as usize };
+        let surface = options.contract == Contract::Surface;
+        let goal = Goal { tolerance: exact, surface, triangles: (most as f64 / share) as usize };
         let start = self.greedy(goal).ok_or(TinError::Cancelled)?;
         if options.method == Method::Greedy {
             return Ok((start, None));
@@ -133,17 +136,20 @@ impl Work<'_> {
 
     /// `None` when cancelled.
     fn make(&self, options: &Options, tolerance: Tolerance) -> Option<(Network, Option<usize>)> {
-        let goal = Goal { tolerance, triangles: options.triangles.unwrap_or(usize::MAX) };
+        let surface = options.contract == Contract::Surface;
+        let free_heights = options.method == Method::Best && !options.on_samples;
+        let rules = Rules { tolerance, surface, free_heights };
+        let goal = Goal { tolerance, surface, triangles: options.triangles.unwrap_or(usize::MAX) };
         let network = match options.method {
             Method::Regular => {
                 let asked = options.max_error.map(|_| tolerance);
                 let (network, step) =
-                    regular(self.field, self.region, asked, options.triangles, self.control)?;
+                    regular(self.field, self.region, asked, surface, options.triangles, self.control)?;
                 return Some((network, Some(step)));
             }
             Method::Greedy => self.greedy(goal)?,
-            Method::Decimation => self.decimation(tolerance)?,
-            Method::Best => self.best(tolerance, !options.on_samples)?,
+            Method::Decimation => self.decimation(rules)?,
+            Method::Best => self.best(rules)?,
         };
         Some((network, None))
     }
@@ -152,22 +158,23 @@ impl Work<'_> {
         Some(Network::of(&greedy(self.field, self.region, goal, self.control)?, self.field))
     }
 
-    fn best(&self, tolerance: Tolerance, free_heights: bool) -> Option<Network> {
-        let mut network = self.greedy(Goal { tolerance, triangles: usize::MAX })?;
+    fn best(&self, rules: Rules) -> Option<Network> {
+        let mut network =
+            self.greedy(Goal { tolerance: rules.tolerance, surface: rules.surface, triangles: usize::MAX })?;
         for (i, shift) in SHIFTS.into_iter().enumerate() {
             let done = [i, i + 1].map(|i| i as f64 / SHIFTS.len() as f64);
-            network.improve(self.field, tolerance, Pass { shift, free_heights, done }, self.control)?;
+            network.improve(self.field, Pass { shift, rules, done }, self.control)?;
         }
         Some(network)
     }
 
-    fn decimation(&self, tolerance: Tolerance) -> Option<Network> {
+    fn decimation(&self, rules: Rules) -> Option<Network> {
         let mut network = Network::full(self.field, self.region);
         // Blocks have the same number of triangles in every pass, so they grow.
         for i in 0.. {
             let before = network.triangles.len();
-            let pass = Pass { shift: SHIFTS[i % 3], free_heights: false, done: [0.0, 1.0] };
-            network.improve(self.field, tolerance, pass, self.control)?;
+            let pass = Pass { shift: SHIFTS[i % SHIFTS.len()], rules, done: [0.0, 1.0] };
+            network.improve(self.field, pass, self.control)?;
             if network.triangles.len() * 100 > before * 99 {
                 break;
             }

@@ -38,5 +38,5 @@ mod thin;
 mod verify;
 
 pub use make::triangulate;
-pub use options::{Control, Errors, Made, Method, Options, Quiet, Tin, TinError};
+pub use options::{Contract, Control, Errors, Made, Method, Options, Quiet, Tin, TinError};
 pub use verify::{Verdict, verify};

@@ -5,7 +5,7 @@ use super::delaunay::Triangulation;
 use super::field::Field;
 use super::parallel;
 use super::region::Region;
-use super::scan::{Corner, Plane, farthest, rows};
+use super::scan::{Corner, Plane, crossings, farthest, rows};
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Network {
@@ -79,7 +79,7 @@ impl Network {
     pub(super) fn errors(&self, field: &Field, heights: &[f64]) -> Errors {
         let columns = field.columns as usize;
         let parts = parallel::map(self.triangles.chunks(CHUNK).collect(), |chunk: &[[u32; 3]]| {
-            let (mut greatest, mut sum, mut count) = (0.0f64, 0.0, 0usize);
+            let (mut greatest, mut sum, mut count, mut between) = (0.0f64, 0.0, 0usize, 0.0f64);
             for t in chunk {
                 let [a, b, c] = t.map(|v| self.vertices[v as usize]);
                 let plane = Plane::new(a, b, c);
@@ -94,15 +94,24 @@ impl Network {
                         s += plane.dx;
                     }
                 });
+                for (p, q) in [(a, b), (b, c), (c, a)] {
+                    crossings(field, p, q, |c| {
+                        let side = c.miss as f64 / c.parts as f64 * field.quantum;
+                        between = between.max(side.abs());
+                    });
+                }
             }
-            (greatest, sum, count)
+            (greatest, sum, count, between)
         });
-        let (mut greatest, mut sum, mut count) = (0.0f64, 0.0, 0);
-        for (g, s, c) in parts {
+        let (mut greatest, mut sum, mut count, mut between) = (0.0f64, 0.0, 0, 0.0f64);
+        for (g, s, c, b) in parts {
             greatest = greatest.max(g);
+            between = between.max(b);
             sum += s;
             count += c;
         }
-        Errors { max: greatest, rms: (sum / count.max(1) as f64).sqrt() }
+        // Crossings are judged by rounded heights, which may be off by the rounding.
+        let surface = if between > 0.0 { greatest.max(between + field.rounding) } else { greatest };
+        Errors { max: greatest, rms: (sum / count.max(1) as f64).sqrt(), surface }
     }
 }

@@ -34,6 +34,17 @@ pub enum Method {
     Best,
 }
 
+/// Where the error holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Contract {
+    /// At every valid sample.
+    #[default]
+    Samples,
+    /// Everywhere: against the grid's own triangles, with the diagonals from `(x, y)` to `(x + 1, y + 1)`. Both surfaces are flat
+    /// between samples and the points where a side crosses an edge of the grid, so these decide.
+    Surface,
+}
+
 /// What to make. Start from `Options::default()` and set what differs. With neither an error nor a count the grid's surface itself
 /// comes out, in as few triangles as it takes.
 #[derive(Clone, Debug, Default)]
@@ -41,6 +52,8 @@ pub enum Method {
 pub struct Options {
     /// No sample is farther from the surface than this, vertically, in the grid's units.
     pub max_error: Option<f64>,
+    /// Where `max_error` holds. Default: at the samples.
+    pub contract: Contract,
     /// At most this many triangles, as long as the outline allows; with an error too, the first of the two ends the work.
     pub triangles: Option<usize>,
     /// The method. Default: the best.
@@ -54,6 +67,13 @@ impl Options {
     #[must_use]
     pub fn with_max_error(mut self, error: f64) -> Self {
         self.max_error = Some(error);
+        self
+    }
+
+    /// With an error that holds there.
+    #[must_use]
+    pub fn with_contract(mut self, contract: Contract) -> Self {
+        self.contract = contract;
         self
     }
 
@@ -97,6 +117,8 @@ pub struct Errors {
     pub max: f64,
     /// Root of the mean square; samples on sides count for every triangle that has them.
     pub rms: f64,
+    /// The farthest anywhere, against the grid's own triangles: never less than `max`.
+    pub surface: f64,
 }
 
 /// A network and what it keeps.

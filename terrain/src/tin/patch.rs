@@ -21,7 +21,6 @@ pub(super) struct Vertex {
 #[derive(Clone, Debug)]
 pub(super) struct Patch<'a> {
     pub field: &'a Field,
-    pub tolerance: Tolerance,
     pub vertices: Vec<Vertex>,
     pub triangles: Vec<[u32; 3]>,
     /// The triangle across the side from corner i to the next; [`NONE`] at a border.
@@ -29,6 +28,15 @@ pub(super) struct Patch<'a> {
     /// One over the tolerance, in quanta.
     pub(super) scale: f64,
     free: Vec<u32>,
+    pub rules: Rules,
+}
+
+/// What a network keeps while it is improved.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rules {
+    pub tolerance: Tolerance,
+    /// Whether the tolerance holds between samples too.
+    pub surface: bool,
     /// Whether heights may change.
     pub free_heights: bool,
 }
@@ -46,20 +54,18 @@ impl<'a> Patch<'a> {
     /// O(triangles log triangles).
     pub(super) fn new(
         field: &'a Field,
-        tolerance: Tolerance,
+        rules: Rules,
         vertices: Vec<Vertex>,
         triangles: Vec<[u32; 3]>,
-        free_heights: bool,
     ) -> Self {
         let mut patch = Patch {
             field,
-            tolerance,
             across: vec![[NONE; 3]; triangles.len()],
             vertices,
             triangles,
-            scale: 1.0 / tolerance.quanta().max(0.5),
+            scale: 1.0 / rules.tolerance.quanta().max(0.5),
             free: vec![],
-            free_heights,
+            rules,
         };
         let mut sides: Vec<(u32, u32, u32)> = Vec::with_capacity(3 * patch.triangles.len());
         for (t, corners) in patch.triangles.iter().enumerate() {

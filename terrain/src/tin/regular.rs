@@ -6,7 +6,7 @@ use super::field::{Field, Tolerance};
 use super::network::Network;
 use super::parallel;
 use super::region::Region;
-use super::scan::farthest;
+use super::scan;
 
 /// Where no step keeps the error, every sample is a vertex.
 const EVERY: usize = 1;
@@ -45,13 +45,14 @@ pub(super) fn regular(
     field: &Field,
     region: &Region,
     tolerance: Option<Tolerance>,
+    surface: bool,
     triangles: Option<usize>,
     control: &dyn Control,
 ) -> Option<(Network, usize)> {
     let keeps = |network: &Network| {
         let within = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|v| network.vertices[v as usize]);
-            tolerance.is_none_or(|tolerance| farthest(field, a, b, c).within(tolerance))
+            let corners = t.map(|v| network.vertices[v as usize]);
+            tolerance.is_none_or(|tolerance| scan::keeps(field, tolerance, surface, corners))
         };
         parallel::map(network.triangles.chunks(4096).collect(), |c: &[[u32; 3]]| c.iter().all(within))
             .into_iter()

@@ -162,6 +162,69 @@ pub(super) fn farthest(field: &Field, a: Corner, b: Corner, c: Corner) -> Farthe
     Farthest { miss, sample, area: plane.area }
 }
 
+/// Where a side crosses an edge of the grid between its ends: `part / parts` of the way along the side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crossing {
+    pub part: i64,
+    pub parts: i64,
+    /// Height of the side less that of the grid there, in quanta, times `parts`.
+    pub miss: i64,
+    /// The samples at the ends of the grid's edge.
+    pub ends: [u32; 2],
+}
+
+/// Calls `f` where a side crosses a row, a column or a diagonal of the grid between two samples. The side must lie in the valid region.
+pub(super) fn crossings(field: &Field, a: Corner, b: Corner, mut f: impl FnMut(Crossing)) {
+    let (dx, dy) = (i64::from(b.x - a.x), i64::from(b.y - a.y));
+    let columns = field.columns as usize;
+    // Lines of samples: their number between the ends, and the step from one end of a grid edge to the other.
+    for (parts, step) in [(dx.abs(), columns), (dy.abs(), 1), ((dx - dy).abs(), columns + 1)] {
+        let rise = i64::from(b.z) - i64::from(a.z);
+        // A line along the lines themselves meets samples only.
+        let (mut whole, mut rest) = ((a.x, a.y), (0i64, 0i64));
+        if parts < 2 {
+            continue;
+        }
+        let (qx, rx) = (dx.div_euclid(parts), dx.rem_euclid(parts));
+        let (qy, ry) = (dy.div_euclid(parts), dy.rem_euclid(parts));
+        for part in 1..parts {
+            whole = (whole.0 + qx as i32, whole.1 + qy as i32);
+            rest = (rest.0 + rx, rest.1 + ry);
+            if rest.0 >= parts {
+                (whole.0, rest.0) = (whole.0 + 1, rest.0 - parts);
+            }
+            if rest.1 >= parts {
+                (whole.1, rest.1) = (whole.1 + 1, rest.1 - parts);
+            }
+            // On a column only the row is between samples, on a row only the column, on a diagonal both by as much.
+            let along = rest.0.max(rest.1);
+            if along == 0 {
+                continue;
+            }
+            let first = whole.1 as usize * columns + whole.0 as usize;
+            let (low, high) = (i64::from(field.h[first]), i64::from(field.h[first + step]));
+            let grid = low * (parts - along) + high * along;
+            let miss = i64::from(a.z) * parts + rise * part - grid;
+            f(Crossing { part, parts, miss, ends: [first as u32, (first + step) as u32] });
+        }
+    }
+}
+
+/// Whether a side keeps the tolerance where it crosses edges of the grid.
+pub(super) fn side_within(field: &Field, tolerance: Tolerance, a: Corner, b: Corner) -> bool {
+    let mut within = true;
+    crossings(field, a, b, |c| within &= c.miss.abs() <= tolerance.over(c.parts));
+    within
+}
+
+/// Whether a triangle keeps the tolerance at its samples, and with `surface` all over, against the grid's triangles.
+pub(super) fn keeps(field: &Field, tolerance: Tolerance, surface: bool, t: [Corner; 3]) -> bool {
+    let [a, b, c] = t;
+    let sides = [(a, b), (b, c), (c, a)];
+    farthest(field, a, b, c).within(tolerance)
+        && (!surface || sides.into_iter().all(|(p, q)| side_within(field, tolerance, p, q)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -33,8 +33,7 @@ impl Patch<'_> {
     /// Moves heights, swaps sides, takes vertices away.
     pub(super) fn improve(&mut self, scratch: &mut Scratch) {
         self.relax_all(scratch);
-        self.swap_all(scratch);
-        self.relax_all(scratch);
+        self.swap_all();
         self.thin(scratch);
     }
 
@@ -71,7 +70,7 @@ impl Patch<'_> {
     /// The energy of a triangle that is there.
     fn energy_of(&self, t: u32) -> f64 {
         let [a, b, c] = self.triangles[t as usize].map(|v| self.corner(v));
-        self.energy(a, b, c).unwrap_or(0.0)
+        self.energy(a, b, c, f64::INFINITY).unwrap_or(0.0)
     }
 
     /// Takes vertices away while the tolerance allows, the cheapest first.
@@ -103,8 +102,10 @@ impl Patch<'_> {
                 self.relax(u, &mut scratch.other, &mut scratch.samples);
             }
             for &u in &ring.vertices {
-                queued[u as usize] = IDLE;
-                if let Some(cost) = self.removal(u, scratch) {
+                // Those in the queue are looked at again when their turn comes: costs mostly grow.
+                if queued[u as usize] == IDLE
+                    && let Some(cost) = self.removal(u, scratch)
+                {
                     queued[u as usize] = key(cost);
                     queue.push(Reverse((key(cost), u)));
                 }
@@ -114,7 +115,7 @@ impl Patch<'_> {
     }
 
     /// Swaps every side once where that lessens the energy.
-    fn swap_all(&mut self, scratch: &mut Scratch) {
+    fn swap_all(&mut self) {
         for t in 0..self.triangles.len() as u32 {
             for i in 0..3 {
                 let corners = self.triangles[t as usize];
@@ -135,14 +136,11 @@ impl Patch<'_> {
                     continue;
                 }
                 let old = self.energy_of(t) + self.energy_of(other);
-                let Some(one) = self.energy(ca, cq, cp) else { continue };
-                let Some(two) = self.energy(cq, cb, cp) else { continue };
+                let Some(one) = self.energy(ca, cq, cp, old) else { continue };
+                let Some(two) = self.energy(cq, cb, cp, old - one) else { continue };
                 // Not for the last digits, or two diagonals could take turns.
                 if one + two < old * (1.0 - 1e-3) {
                     self.replace(&[t, other], &[a, q, b, p], &[[0, 1, 3], [1, 2, 3]]);
-                    for v in [a, q, b, p] {
-                        self.relax(v, &mut scratch.ring, &mut scratch.samples);
-                    }
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! Checks a network against a grid. Slow and plain on purpose: it shares no code with what makes networks, so that both would have to be
 //! wrong in the same way.
 
-use super::Tin;
+use super::{Contract, Tin};
 use crate::Grid;
 
 /// What a network does to a grid's samples.
@@ -12,6 +12,10 @@ pub struct Verdict {
     pub max_error: f64,
     /// Valid samples farther than the error given; decided without rounding where `exact`.
     pub beyond: usize,
+    /// With [`Contract::Surface`]: the greatest distance anywhere from the grid's own triangles; else 0.
+    pub surface_error: f64,
+    /// Pieces of edges of the grid within a triangle with an end farther than the error given.
+    pub pieces_beyond: usize,
     /// Valid samples that no triangle has, but for isolated ones.
     pub uncovered: usize,
     /// Valid samples of no grid triangle with three valid corners.
@@ -32,8 +36,8 @@ impl Verdict {
     /// Whether nothing is wrong.
     #[must_use]
     pub fn is_good(&self) -> bool {
-        let wrong = [self.beyond, self.uncovered, self.over_void, self.turned, self.flat];
-        wrong == [0; 5] && self.excess_area == 0
+        let wrong = [self.beyond, self.pieces_beyond, self.uncovered, self.over_void, self.turned, self.flat];
+        wrong == [0; 6] && self.excess_area == 0
     }
 }
 
@@ -43,7 +47,7 @@ struct Fixed {
 }
 
 impl Fixed {
-    /// The greatest power of two that all values are multiples of; `None` if they take more than 88 bits.
+    /// The greatest power of two that all values are multiples of; `None` if they take more than 72 bits.
     fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let (mut least, mut greatest) = (i32::MAX, i32::MIN);
         for v in values.filter(|&v| v != 0.0 && !v.is_nan()) {
@@ -54,8 +58,8 @@ impl Fixed {
         if least == i32::MAX {
             return Some(Fixed { exponent: 0 });
         }
-        // Weights take 34 bits beside.
-        (greatest - least <= 88).then_some(Fixed { exponent: least })
+        // Areas take 34 bits beside, and the parts of a side 18.
+        (greatest - least <= 72).then_some(Fixed { exponent: least })
     }
 
     fn integer(&self, v: f64) -> i128 {
@@ -84,7 +88,7 @@ fn parts(v: f64) -> (u64, i32) {
 ///
 /// O(samples within the bounds of triangles), one thread.
 #[must_use]
-pub fn verify(grid: &Grid, tin: &Tin, error: f64) -> Verdict {
+pub fn verify(grid: &Grid, tin: &Tin, error: f64, contract: Contract) -> Verdict {
     let bound = if error.is_finite() { error } else { 0.0 };
     let all = grid.heights().iter().chain(&tin.heights).copied().chain([bound]);
     let fixed = Fixed::of(all);
@@ -151,6 +155,11 @@ pub fn verify(grid: &Grid, tin: &Tin, error: f64) -> Verdict {
             }
         }
     }
+    if contract == Contract::Surface {
+        for t in &tin.triangles {
+            pieces(grid, tin, *t, fixed.as_ref(), error, &mut verdict);
+        }
+    }
     let (mut expected, mut used) = (0, vec![false; marks.len()]);
     for y in 0..rows - 1 {
         for x in 0..columns - 1 {
@@ -175,6 +184,84 @@ pub fn verify(grid: &Grid, tin: &Tin, error: f64) -> Verdict {
     verdict
 }
 
+/// Cuts every edge of the grid near a triangle to the part within it, and looks at both ends: between them both surfaces are straight.
+fn pieces(grid: &Grid, tin: &Tin, t: [u32; 3], fixed: Option<&Fixed>, error: f64, verdict: &mut Verdict) {
+    let known = t.iter().all(|&v| (v as usize) < tin.points.len().min(tin.heights.len()));
+    if !known {
+        return;
+    }
+    let p = t.map(|v| tin.points[v as usize].map(i64::from));
+    let z = t.map(|v| tin.heights[v as usize]);
+    let side = |i: usize, q: [i64; 2]| {
+        let (a, b) = (p[i], p[(i + 1) % 3]);
+        (b[0] - a[0]) * (q[1] - a[1]) - (b[1] - a[1]) * (q[0] - a[0])
+    };
+    let area = side(0, p[2]);
+    if area <= 0 {
+        return;
+    }
+    let ends = |axis: usize| {
+        let of = p.map(|p| p[axis]);
+        (of[0].min(of[1]).min(of[2]), of[0].max(of[1]).max(of[2]))
+    };
+    let ((x0, x1), (y0, y1)) = (ends(0), ends(1));
+    for y in y0..=y1 {
+        for x in x0..=x1 {
+            for step in [[1, 0], [0, 1], [1, 1]] {
+                let (from, to) = ([x, y], [x + step[0], y + step[1]]);
+                let height = |q: [i64; 2]| grid.height(q[0] as usize, q[1] as usize);
+                let (Some(low), Some(high)) = (height(from), height(to)) else { continue };
+                // The part of the edge from n0 / d0 to n1 / d1 lies on the inner side of all three sides.
+                let ((mut n0, mut d0), (mut n1, mut d1)) = ((0i64, 1i64), (1i64, 1i64));
+                let mut nothing = false;
+                for i in 0..3 {
+                    let (f, g) = (side(i, from), side(i, to));
+                    match (f >= 0, g >= 0) {
+                        (true, true) => {}
+                        (false, false) => nothing = true,
+                        (false, true) if -f * d0 <= n0 * (g - f) => {}
+                        (false, true) => (n0, d0) = (-f, g - f),
+                        (true, false) if f * d1 >= n1 * (f - g) => {}
+                        (true, false) => (n1, d1) = (f, f - g),
+                    }
+                }
+                if nothing || n0 * d1 >= n1 * d0 {
+                    continue;
+                }
+                let mut beyond = false;
+                for (n, d) in [(n0, d0), (n1, d1)] {
+                    let weights = |q: [i64; 2]| [side(1, q), side(2, q), side(0, q)];
+                    let (u, v) = (weights(from), weights(to));
+                    // The triangle's plane, and the grid's edge, both at n / d.
+                    let value = match fixed {
+                        Some(fixed) => {
+                            let miss = |w: [i64; 3], h: f64| {
+                                let sum: i128 = (0..3).map(|i| i128::from(w[i]) * fixed.integer(z[i])).sum();
+                                sum - i128::from(area) * fixed.integer(h)
+                            };
+                            let all = miss(u, low) * i128::from(d - n) + miss(v, high) * i128::from(n);
+                            let most = i128::from(area) * i128::from(d);
+                            beyond |= error.is_finite() && all.abs() > most * fixed.integer(error);
+                            all as f64 / most as f64 * 2f64.powi(fixed.exponent)
+                        }
+                        None => {
+                            let miss = |w: [i64; 3], h: f64| {
+                                (0..3).map(|i| w[i] as f64 * z[i]).sum::<f64>() / area as f64 - h
+                            };
+                            let part = n as f64 / d as f64;
+                            let value = miss(u, low) * (1.0 - part) + miss(v, high) * part;
+                            beyond |= value.abs() > error;
+                            value
+                        }
+                    };
+                    verdict.surface_error = verdict.surface_error.max(value.abs());
+                }
+                verdict.pieces_beyond += usize::from(beyond);
+            }
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -192,22 +279,37 @@ mod tests {
     #[test]
     fn the_greatest_error_is_found_and_the_bound_is_exact() {
         let (grid, tin) = flat_square();
-        let verdict = verify(&grid, &tin, 0.3);
+        let verdict = verify(&grid, &tin, 0.3, Contract::Samples);
         assert!(verdict.is_good() && verdict.exact, "{verdict:?}");
         assert_eq!(verdict.max_error, 0.3);
-        assert_eq!(verify(&grid, &tin, 0.3f64.next_down()).beyond, 1);
+        assert_eq!(verify(&grid, &tin, 0.3f64.next_down(), Contract::Samples).beyond, 1);
+    }
+
+    #[test]
+    fn between_samples_the_diagonals_decide() {
+        // A cell whose diagonal runs the other way in the network: the middle is 1 too high.
+        let grid = Grid::new(2, 2, vec![0.0, 2.0, 2.0, 0.0]).unwrap();
+        let tin = Tin {
+            points: vec![[0, 0], [1, 0], [1, 1], [0, 1]],
+            heights: vec![0.0, 2.0, 0.0, 2.0],
+            triangles: vec![[0, 1, 3], [1, 2, 3]],
+        };
+        assert!(verify(&grid, &tin, 0.0, Contract::Samples).is_good());
+        let verdict = verify(&grid, &tin, 1.9, Contract::Surface);
+        assert_eq!((verdict.surface_error, verdict.pieces_beyond), (2.0, 2));
+        assert!(verify(&grid, &tin, 2.0, Contract::Surface).is_good());
     }
 
     #[test]
     fn what_is_wrong_is_counted() {
         let (grid, mut tin) = flat_square();
         tin.triangles[1] = [0, 3, 2];
-        let verdict = verify(&grid, &tin, 1.0);
+        let verdict = verify(&grid, &tin, 1.0, Contract::Samples);
         assert_eq!((verdict.turned, verdict.uncovered, verdict.excess_area), (1, 3, -8));
         tin.triangles[1] = [0, 2, 2];
-        assert_eq!(verify(&grid, &tin, 1.0).flat, 1);
+        assert_eq!(verify(&grid, &tin, 1.0, Contract::Samples).flat, 1);
         tin.triangles[1] = [0, 2, 9];
-        assert_eq!(verify(&grid, &tin, 1.0).flat, 1);
+        assert_eq!(verify(&grid, &tin, 1.0, Contract::Samples).flat, 1);
     }
 
     #[test]
@@ -216,7 +318,7 @@ mod tests {
         let mut heights = vec![0.0; 9];
         (heights[1], heights[3]) = (f64::NAN, f64::NAN);
         let grid = Grid::new(3, 3, heights).unwrap();
-        let verdict = verify(&grid, &tin, 1.0);
+        let verdict = verify(&grid, &tin, 1.0, Contract::Samples);
         assert_eq!((verdict.isolated, verdict.over_void), (3, 0));
         assert!(!verdict.is_good());
         let mut heights = vec![0.0; 25];
@@ -224,6 +326,6 @@ mod tests {
         let grid = Grid::new(5, 5, heights).unwrap();
         let points = vec![[0, 0], [4, 0], [4, 4], [0, 4]];
         let tin = Tin { points, heights: vec![0.0; 4], ..flat_square().1 };
-        assert_eq!(verify(&grid, &tin, 1.0).over_void, 1);
+        assert_eq!(verify(&grid, &tin, 1.0, Contract::Samples).over_void, 1);
     }
 }
