@@ -12,13 +12,17 @@ mod base;
 mod coder;
 mod connect;
 mod container;
+mod extras;
 mod input_order;
 mod lattice;
 mod places;
 mod plan;
 mod read;
+mod residual;
 mod rows;
+mod sequel;
 mod splits;
+mod walk;
 mod write;
 
 pub use base::MeshHead;

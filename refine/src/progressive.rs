@@ -11,7 +11,7 @@ mod build;
 mod cursor;
 mod fans;
 mod input;
-mod links;
+pub(crate) mod links;
 mod order;
 
 pub(crate) use attributes::Explicit;

@@ -1,4 +1,4 @@
-//! The entropy coder: adaptive binary decisions, and plain bits beside them.
+//! The entropy coder: adaptive decisions, of two and of sixteen, and plain bits beside them.
 //!
 //! One description of every stream serves both directions: code that is generic over [`Coder`] writes with an [`Encoder`], which returns what
 //! it is given, and reads with a [`Decoder`], which ignores what it is given. So the two cannot drift apart.
@@ -8,6 +8,8 @@
 
 /// Bits of precision of a probability.
 const PRECISION: u32 = 15;
+/// All shares together.
+const TOTAL: u32 = 1 << PRECISION;
 
 /// How probable it is that the next bit is 0, as two estimates, one that learns fast and one that learns slowly; their mean counts.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +51,9 @@ pub(super) trait Coder {
     /// One decision.
     fn bit(&mut self, p: &mut Bit, bit: bool) -> bool;
 
+    /// One of 16 symbols.
+    fn nibble(&mut self, m: &mut Nibble, value: u32) -> u32;
+
     /// The low `bits` (at most 32) of `value`, as they are.
     fn plain(&mut self, bits: u32, value: u32) -> u32;
 
@@ -79,7 +84,7 @@ pub(super) trait Coder {
     /// A number of up to 64 bits: how many it has, then (the highest is 1) the next as a decision, the others plain.
     #[inline]
     fn number(&mut self, m: &mut Number, value: u64) -> u64 {
-        let bits = self.symbol(&mut m.bits, 7, 64 - value.leading_zeros()).min(64);
+        let bits = self.length(&mut m.bits, 64 - value.leading_zeros()).min(64);
         if bits <= 1 {
             return bits as u64;
         }
@@ -87,6 +92,20 @@ pub(super) trait Coder {
         let rest = bits - 2;
         let low = self.plain64(rest, value & low_mask(rest));
         (2 | second) << rest | low
+    }
+
+    /// A number below 76: as long as it is not below 15, 15 is taken off it.
+    #[inline]
+    fn length(&mut self, models: &mut [Nibble; 5], value: u32) -> u32 {
+        let mut done = 0;
+        for m in models {
+            let part = self.nibble(m, value.saturating_sub(done).min(15));
+            done += part;
+            if part < 15 {
+                break;
+            }
+        }
+        done
     }
 
     /// A number with a sign: zigzag, then as [`Coder::number`].
@@ -114,83 +133,92 @@ pub(super) fn unzigzag(x: u64) -> i64 {
 /// What is known about numbers of a kind.
 #[derive(Clone, Debug)]
 pub(super) struct Number {
-    bits: [Bit; 128],
+    bits: [Nibble; 5],
     second: [Bit; 65],
 }
 
 impl Default for Number {
     fn default() -> Self {
-        Number { bits: [Bit::default(); 128], second: [Bit::default(); 65] }
+        Number { bits: Default::default(), second: [Bit::default(); 65] }
     }
 }
 
-/// A range coder (after Martin 1979, with the carry held back) for decisions, and a string of plain bits.
-#[derive(Clone, Debug)]
+/// An adaptive symbol of 16: where the share of each begins, of [`TOTAL`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nibble {
+    start: [i16; 16],
+    seen: u8,
+}
+
+impl Default for Nibble {
+    fn default() -> Self {
+        Nibble { start: std::array::from_fn(|i| (i as i16) << (PRECISION - 4)), seen: 0 }
+    }
+}
+
+impl Nibble {
+    /// Start and size of the share of `symbol`.
+    #[inline]
+    fn share(&self, symbol: usize) -> (u32, u32) {
+        let start = self.start[symbol & 15] as u32;
+        let end = if symbol >= 15 { TOTAL } else { self.start[symbol + 1] as u32 };
+        (start, end - start)
+    }
+
+    /// The symbol in whose share `slot` lies.
+    #[inline]
+    fn find(&self, slot: u32) -> usize {
+        let slot = slot as i16;
+        let below: i16 = self.start.iter().map(|&s| (s <= slot) as i16).sum();
+        below as usize - 1
+    }
+
+    /// Every start moves towards where it were if only `symbol` came and all others kept a share of 1; fast at first.
+    #[inline]
+    fn learn(&mut self, symbol: usize) {
+        let rate = RATES[(self.seen >> 3) as usize];
+        self.seen += (self.seen < 8 * RATES.len() as u8 - 1) as u8;
+        for (i, s) in self.start.iter_mut().enumerate().skip(1) {
+            let goal = if i > symbol { (TOTAL - 16) as i16 + i as i16 } else { i as i16 };
+            *s += (goal - *s) >> rate;
+        }
+    }
+}
+
+/// How slowly a [`Nibble`] learns, by how many eights of symbols it has seen.
+const RATES: [u8; 16] = [3, 4, 4, 5, 5, 5, 5, 6, 6, 6, 6, 6, 6, 6, 6, 7];
+
+/// Writes by range asymmetric numeral systems (Duda 2013): decisions are kept as they come, and coded backwards at the end.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Encoder {
-    low: u64,
-    range: u32,
-    /// The last byte that a carry may change, and how many 0xFF follow it.
-    cache: u8,
-    pending: u64,
-    started: bool,
-    bytes: Vec<u8>,
+    /// Start and size of the share of every decision.
+    shares: Vec<(u16, u16)>,
     window: u64,
     filled: u32,
     plain: Vec<u8>,
 }
 
-impl Default for Encoder {
-    fn default() -> Self {
-        Encoder {
-            low: 0,
-            range: u32::MAX,
-            cache: 0,
-            pending: 0,
-            started: false,
-            bytes: Vec::new(),
-            window: 0,
-            filled: 0,
-            plain: Vec::new(),
-        }
-    }
-}
+/// The least state between decisions; words of 16 bits keep it below 2^32.
+const LEAST: u32 = 1 << 16;
 
 impl Encoder {
-    fn shift(&mut self) {
-        let carry = (self.low >> 32) as u8;
-        if carry != 0 || (self.low as u32) < 0xFF00_0000 {
-            if self.started {
-                self.bytes.push(self.cache.wrapping_add(carry));
-            }
-            self.bytes.extend(std::iter::repeat_n(0xFFu8.wrapping_add(carry), self.pending as usize));
-            self.pending = 0;
-            self.cache = (self.low >> 24) as u8;
-            self.started = true;
-        } else {
-            self.pending += 1;
-        }
-        self.low = (self.low & 0x00FF_FFFF) << 8;
-    }
-
     /// Appends the stream to `out`: the length of the decisions as a varint, decisions, plain bits.
     pub(super) fn finish(mut self, out: &mut Vec<u8>) {
-        // As few bytes as tell the interval: what is missing reads as zero.
-        let end = self.low + self.range as u64 - 1;
-        for keep in [8, 16, 24, 32] {
-            let value = end & !low_mask(32 - keep);
-            if value >= self.low {
-                self.low = value;
-                break;
+        let mut words: Vec<u16> = Vec::with_capacity(self.shares.len() / 4 + 2);
+        let mut state = LEAST;
+        for &(start, size) in self.shares.iter().rev() {
+            let size = size as u32;
+            if state >> (32 - PRECISION) >= size {
+                words.push(state as u16);
+                state >>= 16;
             }
+            state = ((state / size) << PRECISION) + state % size + start as u32;
         }
-        (0..5).for_each(|_| self.shift());
-        for _ in 0..ZEROS_LEFT_OUT {
-            if self.bytes.last() == Some(&0) {
-                self.bytes.pop();
-            }
+        if !self.shares.is_empty() {
+            words.extend([state as u16, (state >> 16) as u16]);
         }
-        put_varint(out, self.bytes.len() as u64);
-        out.extend_from_slice(&self.bytes);
+        put_varint(out, 2 * words.len() as u64);
+        words.iter().rev().for_each(|w| out.extend_from_slice(&w.to_le_bytes()));
         while self.filled > 0 {
             self.plain.push(self.window as u8);
             self.window >>= 8;
@@ -205,19 +233,18 @@ impl Coder for Encoder {
 
     #[inline]
     fn bit(&mut self, p: &mut Bit, bit: bool) -> bool {
-        let bound = (self.range >> PRECISION) * p.zero();
-        if bit {
-            self.low += bound as u64;
-            self.range -= bound;
-        } else {
-            self.range = bound;
-        }
+        let zero = p.zero();
+        self.shares.push(if bit { (zero as u16, (TOTAL - zero) as u16) } else { (0, zero as u16) });
         p.learn(bit);
-        while self.range < 1 << 24 {
-            self.range <<= 8;
-            self.shift();
-        }
         bit
+    }
+
+    #[inline]
+    fn nibble(&mut self, m: &mut Nibble, value: u32) -> u32 {
+        let (start, size) = m.share(value as usize);
+        self.shares.push((start as u16, size as u16));
+        m.learn(value as usize);
+        value
     }
 
     #[inline]
@@ -240,15 +267,14 @@ impl Coder for Encoder {
 /// Reads what an [`Encoder`] wrote. Behind the end it reads zeros, and tells.
 #[derive(Clone, Debug)]
 pub(super) struct Decoder<'a> {
-    code: u32,
-    range: u32,
+    state: u32,
     bytes: &'a [u8],
     at: usize,
     window: u64,
     filled: u32,
     plain: &'a [u8],
     plain_at: usize,
-    /// Plain bits were missing.
+    /// Bits were missing.
     short: bool,
 }
 
@@ -258,8 +284,7 @@ impl<'a> Decoder<'a> {
         let length = take_varint(&mut stream)?;
         let (bytes, plain) = stream.split_at_checked(usize::try_from(length).ok()?)?;
         let mut d = Decoder {
-            code: 0,
-            range: u32::MAX,
+            state: LEAST,
             bytes,
             at: 0,
             window: 0,
@@ -268,14 +293,33 @@ impl<'a> Decoder<'a> {
             plain_at: 0,
             short: false,
         };
-        (0..4).for_each(|_| d.fill());
+        if !bytes.is_empty() {
+            let high = d.word();
+            d.state = (high << 16 | d.word()).max(LEAST);
+        }
         Some(d)
     }
 
     #[inline]
-    fn fill(&mut self) {
-        self.code = self.code << 8 | self.bytes.get(self.at).copied().unwrap_or(0) as u32;
-        self.at += 1;
+    fn word(&mut self) -> u32 {
+        let word = match self.bytes.get(self.at..self.at + 2) {
+            Some(b) => u16::from_le_bytes([b[0], b[1]]) as u32,
+            None => {
+                self.short = true;
+                0
+            }
+        };
+        self.at += 2;
+        word
+    }
+
+    /// Takes a decision's share out of the state.
+    #[inline]
+    fn take(&mut self, (start, size): (u32, u32)) {
+        self.state = size * (self.state >> PRECISION) + (self.state & (TOTAL - 1)) - start;
+        if self.state < LEAST {
+            self.state = self.state << 16 | self.word();
+        }
     }
 }
 
@@ -284,20 +328,19 @@ impl Coder for Decoder<'_> {
 
     #[inline]
     fn bit(&mut self, p: &mut Bit, _: bool) -> bool {
-        let bound = (self.range >> PRECISION) * p.zero();
-        let bit = self.code >= bound;
-        if bit {
-            self.code -= bound;
-            self.range -= bound;
-        } else {
-            self.range = bound;
-        }
+        let zero = p.zero();
+        let bit = self.state & (TOTAL - 1) >= zero;
+        self.take(if bit { (zero, TOTAL - zero) } else { (0, zero) });
         p.learn(bit);
-        while self.range < 1 << 24 {
-            self.range <<= 8;
-            self.fill();
-        }
         bit
+    }
+
+    #[inline]
+    fn nibble(&mut self, m: &mut Nibble, _: u32) -> u32 {
+        let symbol = m.find(self.state & (TOTAL - 1));
+        self.take(m.share(symbol));
+        m.learn(symbol);
+        symbol as u32
     }
 
     #[inline]
@@ -324,12 +367,9 @@ impl Coder for Decoder<'_> {
     }
 
     fn spent(&self) -> bool {
-        self.short || self.at > self.bytes.len() + ZEROS_LEFT_OUT
+        self.short
     }
 }
-
-/// Zero bytes at the end of the decisions that a writer leaves out, at most.
-const ZEROS_LEFT_OUT: usize = 8;
 
 /// Appends a number in groups of 7 bits, the low ones first.
 pub(super) fn put_varint(out: &mut Vec<u8>, mut value: u64) {
@@ -365,6 +405,7 @@ mod tests {
     #[derive(Clone, Debug)]
     enum Item {
         Bit(usize, bool),
+        Nibble(usize, u32),
         Plain(u32, u32),
         Number(u64),
         Signed(i64),
@@ -372,11 +413,13 @@ mod tests {
 
     fn run<C: Coder>(c: &mut C, items: &[Item]) -> Vec<u64> {
         let mut bits = [Bit::default(); 3];
+        let mut nibbles = [Nibble::default(); 2];
         let (mut number, mut signed) = (Number::default(), Number::default());
         items
             .iter()
             .map(|i| match *i {
                 Item::Bit(k, b) => c.bit(&mut bits[k], b) as u64,
+                Item::Nibble(k, v) => c.nibble(&mut nibbles[k], v) as u64,
                 Item::Plain(n, v) => c.plain(n, v) as u64,
                 Item::Number(v) => c.number(&mut number, v),
                 Item::Signed(v) => c.signed(&mut signed, v) as u64,
@@ -387,6 +430,7 @@ mod tests {
     fn item() -> impl Strategy<Value = Item> {
         prop_oneof![
             (0..3usize, prop::bool::weighted(0.02)).prop_map(|(k, b)| Item::Bit(k, b)),
+            (0..2usize, prop_oneof![3 => Just(7u32), 1 => 0..16u32]).prop_map(|(k, v)| Item::Nibble(k, v)),
             (0..=32u32, any::<u32>()).prop_map(|(n, v)| Item::Plain(n, (v as u64 & low_mask(n)) as u32)),
             (0..=64u32, any::<u64>()).prop_map(|(n, v)| Item::Number(v & low_mask(n))),
             any::<i64>().prop_map(Item::Signed),

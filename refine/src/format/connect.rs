@@ -125,7 +125,6 @@ impl Default for Models {
 
 pub(super) struct Connect<'a> {
     head: &'a MeshHead,
-    pub(super) next_wedge: usize,
     /// Numbers of the next vertex and face.
     vertex: usize,
     face: usize,
@@ -189,7 +188,6 @@ impl<'a> Connect<'a> {
     pub(super) fn new(head: &'a MeshHead, first: Counts) -> Self {
         Connect {
             head,
-            next_wedge: first.wedge,
             vertex: head.base_vertices as usize + first.split,
             face: first.face,
             first_face: first.face,

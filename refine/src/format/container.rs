@@ -25,8 +25,10 @@ pub struct ChunkType(pub [u8; 4]);
 impl ChunkType {
     /// A mesh's head and its base.
     pub const BASE: ChunkType = ChunkType(*b"BASE");
-    /// Vertex splits.
+    /// Vertex splits, read alone.
     pub const SPLITS: ChunkType = ChunkType(*b"SPLT");
+    /// Vertex splits, read when those before are there.
+    pub const SEQUEL: ChunkType = ChunkType(*b"SPLS");
     /// The input's numbering of a mesh.
     pub const ORDER: ChunkType = ChunkType(*b"ORDR");
     /// What the mesh stands in; opaque here.
@@ -311,8 +313,9 @@ impl Directory {
             if c.raw > c.stored.saturating_mul(EXPANSION) || c.count as u64 > c.raw {
                 return Err(c.damage("it is too short for what it is to hold"));
             }
-            let known =
-                [ChunkType::BASE, ChunkType::SPLITS, ChunkType::ORDER, ChunkType::SCENE].contains(&c.kind);
+            const KNOWN: [ChunkType; 5] =
+                [ChunkType::BASE, ChunkType::SPLITS, ChunkType::SEQUEL, ChunkType::ORDER, ChunkType::SCENE];
+            let known = KNOWN.contains(&c.kind);
             if !known {
                 if c.critical {
                     return Err(c.damage("this program does not know it, and it may not be skipped"));
@@ -329,7 +332,7 @@ impl Directory {
                 (ChunkType::BASE, None) => *mesh = Some(0),
                 (ChunkType::BASE, Some(_)) => return Err(c.damage("the mesh has a base already")),
                 (_, None) => return Err(c.damage("it comes before the base of its mesh")),
-                (ChunkType::SPLITS, Some(n)) => {
+                (ChunkType::SPLITS | ChunkType::SEQUEL, Some(n)) => {
                     if c.first != n {
                         return Err(c.damage("its splits do not follow those before"));
                     }

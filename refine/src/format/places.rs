@@ -33,6 +33,19 @@ impl Lattice {
         if k.abs() < FARTHEST { k as i64 } else { 0 }
     }
 
+    /// The indices of a point, if it is one of the lattice, bit for bit.
+    #[inline]
+    pub(super) fn indices(&self, double: bool, p: [f64; 3]) -> Option<[i64; 3]> {
+        let mut k = [0; 3];
+        for axis in 0..3 {
+            k[axis] = self.nearest(axis, p[axis]);
+            if self_round(double, self.at(axis, k[axis])).to_bits() != p[axis].to_bits() {
+                return None;
+            }
+        }
+        Some(k)
+    }
+
     /// Usable at all.
     pub(super) fn is_sound(&self) -> bool {
         let positive = |x: f64| x.is_finite() && x > 0.0;
@@ -70,24 +83,6 @@ impl<'a> Places<'a> {
         }
     }
 
-    #[inline]
-    fn round(&self, x: f64) -> f64 {
-        if self.double { x } else { x as f32 as f64 }
-    }
-
-    /// Indices on lattice `l`, if the point is one of it, bit for bit.
-    #[inline]
-    fn indices(&self, l: &Lattice, p: [f64; 3]) -> Option<[i64; 3]> {
-        let mut k = [0; 3];
-        for axis in 0..3 {
-            k[axis] = l.nearest(axis, p[axis]);
-            if self.round(l.at(axis, k[axis])).to_bits() != p[axis].to_bits() {
-                return None;
-            }
-        }
-        Some(k)
-    }
-
     /// Codes `value`, given what it is expected to be; `context` (below 4) tells kinds of places apart.
     #[inline]
     pub(super) fn code<C: Coder>(
@@ -102,7 +97,7 @@ impl<'a> Places<'a> {
             let found = if C::READS {
                 None
             } else {
-                lattices.iter().enumerate().find_map(|(i, l)| self.indices(l, value).map(|k| (i, k)))
+                lattices.iter().enumerate().find_map(|(i, l)| l.indices(self.double, value).map(|k| (i, k)))
             };
             if c.bit(&mut self.on_lattice[context], found.is_some()) {
                 let (mut which, k) = found.unwrap_or_default();
@@ -162,12 +157,12 @@ pub(super) fn unorder32(x: u32) -> u32 {
 }
 
 #[inline]
-fn order64(bits: u64) -> u64 {
+pub(super) fn order64(bits: u64) -> u64 {
     if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
 }
 
 #[inline]
-fn unorder64(x: u64) -> u64 {
+pub(super) fn unorder64(x: u64) -> u64 {
     if x >> 63 == 1 { x & !(1 << 63) } else { !x }
 }
 

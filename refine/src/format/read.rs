@@ -3,7 +3,9 @@
 use super::base::{self, MeshHead};
 use super::container::{Chunk, ChunkType, Directory, FormatError, HEAD};
 use super::input_order;
+use super::sequel;
 use super::splits::{self, SplitBlock};
+use super::walk::Walk;
 use crate::progressive::{InputOrder, ProgressiveMesh};
 use std::io::Read;
 use std::ops::Range;
@@ -16,6 +18,8 @@ pub enum Piece {
     Base(Box<(MeshHead, ProgressiveMesh)>),
     /// Splits of a mesh.
     Splits(Box<SplitBlock>),
+    /// Bytes of splits that are read with the mesh they refine ([`Assembly`]).
+    Sequel(Vec<u8>),
     /// Bytes of the input's order of a mesh; they are read with the mesh ([`Assembly`]).
     Order(Vec<u8>),
     /// The scene, opaque here.
@@ -41,6 +45,7 @@ fn read_piece(chunk: &Chunk, head: Option<&MeshHead>, bytes: &[u8]) -> Result<Pi
             let block = splits::read(head, at, chunk.count as usize, chunk.raw, bytes).ok_or_else(damaged)?;
             Ok(Piece::Splits(Box::new(block)))
         }
+        ChunkType::SEQUEL => Ok(Piece::Sequel(bytes.to_vec())),
         ChunkType::ORDER => Ok(Piece::Order(bytes.to_vec())),
         ChunkType::SCENE if chunk.raw != chunk.stored => Err(damaged()),
         ChunkType::SCENE => Ok(Piece::Scene(bytes.to_vec())),
@@ -62,6 +67,36 @@ struct Part {
     mesh: ProgressiveMesh,
     faces: usize,
     wedges: usize,
+    /// Once splits were read with it.
+    walk: Option<Walk>,
+    /// Damage has ended it.
+    void: bool,
+}
+
+impl Part {
+    /// Appends splits; false (and nothing done) if they do not follow those that are there.
+    fn append(&mut self, block: &SplitBlock) -> bool {
+        let follows = block.first_face as usize == self.faces
+            && (self.mesh.wedges.is_none() || block.first_wedge as usize == self.wedges)
+            && self.mesh.splits.len() + block.splits.len() <= self.head.splits as usize
+            && block.append_to(&mut self.mesh);
+        if follows {
+            self.faces += block.faces();
+            self.wedges += block.new_wedges();
+        }
+        follows
+    }
+
+    /// The splits of a chunk that is read with the mesh.
+    fn sequel(&mut self, chunk: &Chunk, bytes: &[u8]) -> Option<SplitBlock> {
+        if self.walk.is_none() && !self.mesh.splits.is_empty() {
+            // Splits that were read alone came before.
+            return None;
+        }
+        let walk = self.walk.get_or_insert_with(|| Walk::new(&self.mesh));
+        let at = (chunk.first, chunk.first_face);
+        sequel::read(&self.head, walk, at, chunk.count as usize, chunk.raw, bytes)
+    }
 }
 
 impl Assembly {
@@ -89,19 +124,23 @@ impl Assembly {
             (Piece::Base(both), Some(part @ None)) => {
                 let (head, mesh) = *both;
                 let (faces, wedges) = (head.base_faces as usize, head.base_wedges as usize);
-                *part = Some(Part { head, mesh, faces, wedges });
+                *part = Some(Part { head, mesh, faces, wedges, walk: None, void: false });
             }
             (Piece::Splits(block), Some(Some(part))) => {
-                let follows = block.first_face as usize == part.faces
-                    && (part.mesh.wedges.is_none() || block.first_wedge as usize == part.wedges)
-                    && part.mesh.splits.len() + block.splits.len() <= part.head.splits as usize;
-                let wedges = block.new_wedges();
-                if !follows || !block.append_to(&mut part.mesh) {
+                if part.walk.is_some() || !part.append(&block) {
                     return Err(chunk.damage("its splits do not follow those before"));
                 }
-                part.faces += block.faces();
-                part.wedges += wedges;
                 self.turns.extend(std::iter::repeat_n(chunk.mesh, block.splits.len()));
+            }
+            (Piece::Sequel(bytes), Some(Some(part))) if !part.void => {
+                let block = part.sequel(chunk, &bytes);
+                match block.filter(|b| part.append(b)) {
+                    Some(block) => self.turns.extend(std::iter::repeat_n(chunk.mesh, block.splits.len())),
+                    None => {
+                        part.void = true;
+                        return Err(chunk.damage("its contents contradict each other, or what came before"));
+                    }
+                }
             }
             (Piece::Order(bytes), Some(Some(part))) if part.mesh.order.is_none() => {
                 if part.mesh.splits.len() < part.head.splits as usize {
@@ -203,7 +242,7 @@ impl StreamSizes {
             ChunkType::BASE => self.base += chunk.stored,
             ChunkType::ORDER => self.order += chunk.stored,
             ChunkType::SCENE => self.scene += chunk.stored,
-            ChunkType::SPLITS => {
+            ChunkType::SPLITS | ChunkType::SEQUEL => {
                 let [c, e, p, a, f] = splits::sizes(bytes).unwrap_or_default();
                 self.connectivity += c;
                 self.errors += e;

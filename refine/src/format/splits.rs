@@ -3,10 +3,10 @@
 use super::base::MeshHead;
 use super::coder::{Bit, Coder, Decoder, Encoder, Number, put_varint, take_varint};
 use super::connect::{Connect, Step};
+use super::extras::Extras;
 use super::places::{self, Places};
-use super::rows::Rows;
-use crate::aif::{NONE, Positions};
-use crate::progressive::{Damage, ProgressiveMesh, SplitCode, SplitKind, Splits};
+use crate::aif::Positions;
+use crate::progressive::{Damage, ProgressiveMesh, SplitCode, Splits};
 
 /// Consecutive splits of a mesh, with all that belongs to them: parts of the arrays of a [`ProgressiveMesh`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,11 +39,9 @@ pub struct SplitBlock {
 
 /// Kinds of streams within a chunk of splits, in the order in which they stand there.
 pub(super) const STREAMS: usize = 5;
-const CONNECTIVITY: usize = 0;
-const ERRORS: usize = 1;
-const PLACES: usize = 2;
-const ATTRIBUTES: usize = 3;
-const FACES: usize = 4;
+pub(super) const CONNECTIVITY: usize = 0;
+pub(super) const ERRORS: usize = 1;
+pub(super) const PLACES: usize = 2;
 
 impl SplitBlock {
     /// Faces they make.
@@ -110,7 +108,7 @@ pub(super) struct Counts {
 }
 
 /// Errors in the file: the upper 10 bits of an f32 below the sign, rounded up: 2 bits of mantissa.
-const ERROR_SHIFT: u32 = 21;
+pub(super) const ERROR_SHIFT: u32 = 21;
 
 /// `error` as the file keeps it: never less, at most a quarter more.
 pub(super) fn rounded_error(error: f32) -> f32 {
@@ -126,25 +124,19 @@ pub(super) fn error_level(error: f32) -> u32 {
 
 /// One description of the chunk for both directions: `source` when writing, `out` when reading.
 struct Codec<'a> {
-    head: &'a MeshHead,
     connect: Connect<'a>,
     places: Places<'a>,
-    rows: Option<Rows>,
+    extras: Extras,
     error: Number,
     error_near: [Bit; 32],
     error_start: Option<u32>,
     error_before: u32,
-    explicit: [Number; 6],
-    none: [Bit; 3],
-    face_same: [Bit; 2],
-    face_value: [Number; 2],
-    face_last: [u32; 2],
 }
 
-struct Source<'a> {
-    pm: &'a ProgressiveMesh,
-    fans: &'a Fans,
-    at: Counts,
+pub(super) struct Source<'a> {
+    pub(super) pm: &'a ProgressiveMesh,
+    pub(super) fans: Option<&'a Fans>,
+    pub(super) at: Counts,
 }
 
 /// The edges around the vertex of every split, from the left cut on.
@@ -174,19 +166,13 @@ impl Fans {
 impl<'a> Codec<'a> {
     fn new(head: &'a MeshHead, first: Counts) -> Self {
         Codec {
-            head,
             connect: Connect::new(head, first),
             places: Places::new(head.double, &head.lattices),
-            rows: head.channels.as_deref().map(Rows::new),
+            extras: Extras::new(head, first.wedge),
             error: Number::default(),
             error_near: Default::default(),
             error_start: None,
             error_before: 0,
-            explicit: Default::default(),
-            none: Default::default(),
-            face_same: Default::default(),
-            face_value: Default::default(),
-            face_last: [NONE; 2],
         }
     }
 
@@ -206,7 +192,7 @@ impl<'a> Codec<'a> {
                 code: splits.code[i],
             }
         });
-        let fan = source.as_ref().map_or(&[][..], |s| s.fans.of(s.at.split));
+        let fan = source.as_ref().and_then(|s| s.fans.map(|f| f.of(s.at.split))).unwrap_or_default();
         let step = self.connect.code(&mut c[CONNECTIVITY], step, fan)?;
         // Error.
         let level = source.as_ref().map_or(0, |s| error_level(s.pm.splits.error[s.at.split]));
@@ -230,34 +216,8 @@ impl<'a> Codec<'a> {
             places::push(&mut out.new_positions, at);
             moved.iter().for_each(|&to| places::push(&mut out.moved_positions, to));
         }
-        let (new, changed) = self.wedges(&mut c[ATTRIBUTES], step, source, out)?;
-        let faces = 1 + step.code.two_faces() as usize;
-        for k in 0..2 {
-            if [self.head.materials, self.head.groups][k] {
-                for f in 0..faces {
-                    let value = source
-                        .as_ref()
-                        .map_or(0, |s| [&s.pm.face_material, &s.pm.face_group][k][s.at.face + f]);
-                    let value = self.face(&mut c[FACES], k, value)?;
-                    if C::READS {
-                        [&mut out.face_material, &mut out.face_group][k].push(value);
-                    }
-                }
-            }
-        }
-        if self.rows.is_some() {
-            out.wedges = out.wedges.checked_add(u32::try_from(new).ok()?)?;
-        }
-        if let Some(s) = source {
-            s.at.split += 1;
-            s.at.face += faces;
-            s.at.wedge += new;
-            s.at.moved += moved.is_some() as usize;
-            if self.rows.is_some() {
-                s.at.row += new + changed;
-            }
-        }
-        Some(())
+        let [.., attributes, faces] = c;
+        self.extras.code((attributes, faces), (step.vertex, step.code), source, out)
     }
 
     /// A level of error: one of some around the first of the chunk, or any.
@@ -269,100 +229,6 @@ impl<'a> Codec<'a> {
             return Some(start + inside);
         }
         u32::try_from(c.number(&mut self.error, level as u64)).ok()
-    }
-
-    /// A material or group: mostly that of the face before.
-    fn face<C: Coder>(&mut self, c: &mut C, k: usize, value: u32) -> Option<u32> {
-        let last = self.face_last[k];
-        if !c.bit(&mut self.face_same[k], value == last) {
-            // NONE is 0.
-            let x = c.number(&mut self.face_value[k], value.wrapping_add(1) as u64);
-            self.face_last[k] = u32::try_from(x).ok()?.wrapping_sub(1);
-        }
-        Some(self.face_last[k])
-    }
-
-    /// Explicit wedges and rows; returns the numbers of new and of changed wedges.
-    fn wedges<C: Coder>(
-        &mut self,
-        c: &mut C,
-        step: Step,
-        source: &mut Option<Source<'_>>,
-        out: &mut SplitBlock,
-    ) -> Option<(usize, usize)> {
-        let Some(rows) = &mut self.rows else {
-            return Some((1, 0))
-                .filter(|_| step.code.kind() == SplitKind::Plain && !step.code.changes_rows());
-        };
-        let wedge = self.connect.next_wedge;
-        let (mut new, mut changed) = (1, step.code.changes_rows() as usize);
-        match step.code.kind() {
-            SplitKind::Plain => {}
-            SplitKind::Seam => (new, changed) = (2, 2 * changed),
-            SplitKind::Explicit => {
-                let list =
-                    source.as_ref().and_then(|s| s.pm.wedges.as_ref()).map_or(&[][..], |w| &w.explicit);
-                let mut at = source.as_ref().map_or(0, |s| s.at.explicit);
-                let mut next = || {
-                    at += 1;
-                    list.get(at - 1).copied().unwrap_or(0)
-                };
-                let pairs = c.number(&mut self.explicit[0], next() as u64);
-                let listed = c.number(&mut self.explicit[1], next() as u64);
-                let start = out.explicit.len();
-                if C::READS {
-                    out.explicit.extend([u32::try_from(pairs).ok()?, u32::try_from(listed).ok()?]);
-                }
-                new = 0;
-                let tips = 3 + 3 * step.code.two_faces() as u64;
-                for k in 0..pairs.checked_mul(2)?.checked_add(listed)?.checked_add(tips)? {
-                    let (m, flag) = match k {
-                        _ if k >= 2 * pairs + listed => (4 + ((k - 2 * pairs - listed) % 3 == 2) as usize, 2),
-                        _ if k >= 2 * pairs => (3, 1),
-                        _ => (2, 0),
-                    };
-                    let value = next();
-                    let id = if c.bit(&mut self.none[flag], value == NONE) {
-                        NONE
-                    } else {
-                        let back = c.signed(&mut self.explicit[m], wedge as i64 - value as i64);
-                        let x = (wedge as i64).wrapping_sub(back);
-                        u32::try_from(x).ok()?
-                    };
-                    new += (k < 2 * pairs && k % 2 == 1 && id != NONE && id as usize >= wedge) as usize;
-                    if C::READS {
-                        out.explicit.push(id);
-                        if c.spent() {
-                            return None;
-                        }
-                    }
-                }
-                changed = listed as usize;
-                if C::READS && out.explicit.len() - start < 5 {
-                    return None;
-                }
-                if let Some(s) = source {
-                    s.at.explicit = at;
-                }
-            }
-        }
-        for k in 0..new.checked_add(changed)? {
-            let row = source.as_ref().and_then(|s| {
-                let w = s.pm.wedges.as_ref()?;
-                let r = s.at.row + k;
-                Some((w.present[r], &w.rows[r * w.stride..(r + 1) * w.stride]))
-            });
-            let present = rows.code(c, step.vertex, row);
-            if C::READS {
-                out.rows.extend_from_slice(rows.row());
-                out.present.push(present);
-                if c.spent() {
-                    return None;
-                }
-            }
-        }
-        self.connect.next_wedge += new;
-        Some((new, changed))
     }
 }
 
@@ -381,7 +247,7 @@ pub(super) fn write(
     let mut codec = Codec::new(head, first);
     let vertices = &pm.splits.vertex[first.split..first.split + count];
     codec.connect.begin(&mut streams[CONNECTIVITY], vertices)?;
-    let mut source = Some(Source { pm, fans, at: first });
+    let mut source = Some(Source { pm, fans: Some(fans), at: first });
     let mut nothing = SplitBlock::default();
     for _ in 0..count {
         codec.split(&mut streams, &mut source, &mut nothing)?;

@@ -5,7 +5,9 @@ use super::container::{Chunk, ChunkType, Directory, EXPANSION};
 use super::input_order;
 use super::lattice;
 use super::plan::{Piece, Plan};
+use super::sequel;
 use super::splits::{self, Counts, Fans};
+use super::walk::Walk;
 use crate::progressive::{Damage, ProgressiveMesh, RowsOf};
 
 /// How to write.
@@ -16,12 +18,20 @@ pub struct EncodeOptions {
     pub any_order: bool,
     /// Move all vertices onto a grid of `2^bits` cells along the longest side of each mesh's box; 2..=30. Smaller files, but lossy.
     pub quantize: Option<u32>,
+    /// Every chunk can be read alone, whatever else was read. Larger files: by a third or more.
+    pub alone: bool,
 }
 
 impl EncodeOptions {
     /// Sets [`EncodeOptions::any_order`].
     pub fn with_any_order(mut self, on: bool) -> Self {
         self.any_order = on;
+        self
+    }
+
+    /// Sets [`EncodeOptions::alone`].
+    pub fn with_alone(mut self, on: bool) -> Self {
+        self.alone = on;
         self
     }
 
@@ -180,12 +190,12 @@ fn encode_mesh(
     };
     let mut base = part(ChunkType::BASE, true, m, base::raw_bytes(&head), base::write(&head, &mut pm)?);
     base.chunk.count = head.base_vertices;
-    let fans = Fans::new(&pm).ok()?;
+    let fans = if options.alone { Some(Fans::new(&pm).ok()?) } else { None };
+    let mut walk = Walk::new(&pm);
     let starts = starts(&pm, &pm.rows_of_splits(), &plan.pieces);
-    let one = |(piece, ends): (&Piece, &[Counts])| {
+    let pack = |piece: &Piece, ends: &[Counts], kind: ChunkType, bytes: Vec<u8>| {
         let (first, end) = (ends[0], ends[1]);
-        let (bytes, _) = splits::write(&head, &pm, &fans, first, piece.count)?;
-        let mut p = part(ChunkType::SPLITS, true, m, raw_bytes(&head, first, end), bytes);
+        let mut p = part(kind, true, m, raw_bytes(&head, first, end), bytes);
         let range = first.split..end.split;
         p.chunk.first = first.split as u32;
         p.chunk.count = piece.count as u32;
@@ -196,10 +206,25 @@ fn encode_mesh(
         let sum: f64 =
             plan.order[range].iter().map(|&i| turns.get(i as usize).map_or(0.0, |&t| t as f64)).sum();
         p.turn = sum / piece.count.max(1) as f64;
-        Some(p)
+        p
     };
     let jobs: Vec<_> = plan.pieces.iter().zip(starts.windows(2)).collect();
-    let splits: Option<Vec<Part>> = super::each(jobs, one).into_iter().collect();
+    let splits: Option<Vec<Part>> = match &fans {
+        Some(fans) => {
+            let one = |(piece, ends): (&Piece, &[Counts])| {
+                let (bytes, _) = splits::write(&head, &pm, fans, ends[0], piece.count)?;
+                Some(pack(piece, ends, ChunkType::SPLITS, bytes))
+            };
+            super::each(jobs, one).into_iter().collect()
+        }
+        None => {
+            let one = |(piece, ends): (&Piece, &[Counts])| {
+                let (bytes, _) = sequel::write(&head, &pm, &mut walk, ends[0], piece.count)?;
+                Some(pack(piece, ends, ChunkType::SEQUEL, bytes))
+            };
+            jobs.into_iter().map(one).collect()
+        }
+    };
     let order = match &pm.order {
         Some(order) if !options.any_order => {
             let raw = input_order::raw_bytes(order, tips.len());
