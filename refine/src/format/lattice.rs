@@ -25,7 +25,7 @@ pub fn suggested_grid(positions: &Positions) -> Option<f64> {
 /// The lattices of a mesh's places: of those that splits move vertices to, if they are multiples of a power of two, and of decimal input.
 pub(super) fn find(pm: &ProgressiveMesh) -> Vec<Lattice> {
     let mut found = Vec::new();
-    found.extend(find_binary(&pm.moved_positions));
+    found.extend(find_binary(pm));
     found.extend(find_decimal(&pm.new_positions));
     found
 }
@@ -35,27 +35,31 @@ fn sample(p: &Positions) -> impl Iterator<Item = [f64; 3]> + '_ {
     (0..p.len()).step_by(step).map(|i| places::point(p, i))
 }
 
-/// Nine of ten places are multiples of the cell in every coordinate.
-fn find_binary(p: &Positions) -> Option<Lattice> {
+/// Places that are multiples of a cell in every coordinate, where other places may be anywhere: the cell that spares most bits.
+fn find_binary(pm: &ProgressiveMesh) -> Option<Lattice> {
     // The exponent of the lowest bit that is set.
     let lowest = |x: f64| -> i32 {
         if x == 0.0 || !x.is_finite() {
-            return i32::MAX;
+            return 2000;
         }
         let bits = x.to_bits();
         let exponent = (bits >> 52 & 0x7FF) as i32 - 1075;
         exponent + (bits | 1 << 52).trailing_zeros() as i32
     };
-    let mut low: Vec<i32> = sample(p).map(|x| x.map(lowest).into_iter().min().unwrap_or(i32::MAX)).collect();
+    let places = || sample(&pm.moved_positions);
+    let mut low: Vec<i32> = places().map(|x| x.map(lowest).into_iter().min().unwrap_or(2000)).collect();
     if low.len() < 16 {
         return None;
     }
     low.sort_unstable();
-    let e = low[low.len() / 10];
-    let largest = sample(p).flatten().map(f64::abs).fold(0.0, f64::max);
-    let cell = (e.clamp(-1000, 1000) as f64).exp2();
+    let largest = places().flatten().map(f64::abs).fold(0.0, f64::max);
     // Finer than this, floats are as good.
-    (largest / cell < (1u64 << 22) as f64).then_some(Lattice { origin: [0.0; 3], step: cell, parts: 1.0 })
+    let least = largest.log2().ceil() as i32 - 22;
+    let saved = |&(k, &e): &(usize, &i32)| (low.len() - k) as i64 * (e - least).clamp(0, 64) as i64;
+    let (k, &e) = low.iter().enumerate().max_by_key(saved)?;
+    // A tenth of the places is worth the flag.
+    let worth = e > least && 10 * (low.len() - k) >= low.len();
+    worth.then(|| Lattice { origin: [0.0; 3], step: (e.clamp(-1000, 1000) as f64).exp2(), parts: 1.0 })
 }
 
 /// Most coordinates have few decimals.
