@@ -3,9 +3,8 @@
 use super::base::{self, MeshHead};
 use super::container::{Chunk, ChunkType, Directory, FormatError, HEAD};
 use super::input_order;
-use super::sequel;
+use super::sequel::{self, Sequel};
 use super::splits::{self, SplitBlock};
-use super::walk::Walk;
 use crate::progressive::{InputOrder, ProgressiveMesh};
 use std::io::Read;
 use std::ops::Range;
@@ -68,7 +67,7 @@ struct Part {
     faces: usize,
     wedges: usize,
     /// Once splits were read with it.
-    walk: Option<Walk>,
+    sequel: Option<Sequel>,
     /// Damage has ended it.
     void: bool,
 }
@@ -89,13 +88,13 @@ impl Part {
 
     /// The splits of a chunk that is read with the mesh.
     fn sequel(&mut self, chunk: &Chunk, bytes: &[u8]) -> Option<SplitBlock> {
-        if self.walk.is_none() && !self.mesh.splits.is_empty() {
+        if self.sequel.is_none() && !self.mesh.splits.is_empty() {
             // Splits that were read alone came before.
             return None;
         }
-        let walk = self.walk.get_or_insert_with(|| Walk::new(&self.mesh));
+        let state = self.sequel.get_or_insert_with(|| Sequel::new(&self.head, &self.mesh));
         let at = (chunk.first, chunk.first_face);
-        sequel::read(&self.head, walk, at, chunk.count as usize, chunk.raw, bytes)
+        sequel::read(&self.head, state, at, chunk.count as usize, chunk.raw, bytes)
     }
 }
 
@@ -124,10 +123,10 @@ impl Assembly {
             (Piece::Base(both), Some(part @ None)) => {
                 let (head, mesh) = *both;
                 let (faces, wedges) = (head.base_faces as usize, head.base_wedges as usize);
-                *part = Some(Part { head, mesh, faces, wedges, walk: None, void: false });
+                *part = Some(Part { head, mesh, faces, wedges, sequel: None, void: false });
             }
             (Piece::Splits(block), Some(Some(part))) => {
-                if part.walk.is_some() || !part.append(&block) {
+                if part.sequel.is_some() || !part.append(&block) {
                     return Err(chunk.damage("its splits do not follow those before"));
                 }
                 self.turns.extend(std::iter::repeat_n(chunk.mesh, block.splits.len()));

@@ -22,9 +22,10 @@ const FAR: u32 = 15;
 const FLAT: usize = 4;
 
 /// Codes positions of one chunk; `KINDS` kinds of them.
-pub(super) struct Residuals<'a, const KINDS: usize> {
+#[derive(Clone, Debug)]
+pub(super) struct Residuals<const KINDS: usize> {
     double: bool,
-    lattices: &'a [Lattice],
+    lattices: Vec<Lattice>,
     on_lattice: [Bit; KINDS],
     second: [Bit; KINDS],
     /// By kind, lattice or none, half of the octave, flatness.
@@ -39,11 +40,11 @@ fn halves(x: f64) -> i32 {
     (x.to_bits() >> 51) as i32 - (1023 << 1)
 }
 
-impl<'a, const KINDS: usize> Residuals<'a, KINDS> {
-    pub(super) fn new(double: bool, lattices: &'a [Lattice]) -> Self {
+impl<const KINDS: usize> Residuals<KINDS> {
+    pub(super) fn new(double: bool, lattices: &[Lattice]) -> Self {
         Residuals {
             double,
-            lattices,
+            lattices: lattices.to_vec(),
             on_lattice: [Bit::default(); KINDS],
             second: [Bit::default(); KINDS],
             length: vec![Default::default(); KINDS * (1 + lattices.len())],
@@ -68,8 +69,8 @@ impl<'a, const KINDS: usize> Residuals<'a, KINDS> {
             let h = halves(r).max(longest - 2 * FLAT as i32 + 1);
             (h, ((longest - h) >> 1) as usize)
         });
-        let lattices = self.lattices;
-        if !lattices.is_empty() {
+        if !self.lattices.is_empty() {
+            let lattices = &self.lattices;
             let found = if C::READS {
                 None
             } else {
@@ -80,21 +81,22 @@ impl<'a, const KINDS: usize> Residuals<'a, KINDS> {
                 if lattices.len() > 1 {
                     which = c.bit(&mut self.second[kind], which == 1) as usize;
                 }
-                let l = &lattices[which];
+                let l = self.lattices[which];
+                let sets = 1 + self.lattices.len();
                 let unit = halves(l.step / l.parts) & !1;
                 let mut out = [0.0; 3];
                 for axis in 0..3 {
                     let expected = l.nearest(axis, guess.at[axis]);
                     let residual = k[axis].wrapping_sub(expected);
                     let (h, flat) = near[axis];
-                    let k = self.residual(c, kind * (1 + lattices.len()) + 1 + which, h - unit, flat, residual);
+                    let k = self.residual(c, kind * sets + 1 + which, h - unit, flat, residual);
                     let x = l.at(axis, expected.wrapping_add(k));
                     out[axis] = if self.double { x } else { x as f32 as f64 };
                 }
                 return out;
             }
         }
-        let set = kind * (1 + lattices.len());
+        let set = kind * (1 + self.lattices.len());
         let mut out = [0.0; 3];
         for axis in 0..3 {
             let (h, flat) = near[axis];

@@ -46,7 +46,7 @@ fn valence_class(n: usize) -> usize {
     n.clamp(2, VALENCES + 1) - 2
 }
 
-#[derive(Default)]
+#[derive(Clone, Debug, Default)]
 struct Models {
     roots: Number,
     root: Number,
@@ -64,13 +64,32 @@ struct Models {
     error_far: Number,
 }
 
+/// What goes on from chunk to chunk: the mesh, and what was learned about symbols.
+#[derive(Clone, Debug)]
+pub(super) struct Sequel {
+    walk: Walk,
+    residuals: Residuals<3>,
+    m: Box<Models>,
+}
+
+impl Sequel {
+    /// At the base of `pm`.
+    pub(super) fn new(head: &MeshHead, pm: &ProgressiveMesh) -> Self {
+        Sequel {
+            walk: Walk::new(pm),
+            residuals: Residuals::new(head.double, &head.lattices),
+            m: Box::default(),
+        }
+    }
+}
+
 /// Codes one chunk.
 struct Codec<'a> {
     head: &'a MeshHead,
     walk: &'a mut Walk,
-    residuals: Residuals<'a, 3>,
+    residuals: &'a mut Residuals<3>,
     extras: Extras,
-    m: Models,
+    m: &'a mut Models,
     ring: Ring,
     /// The vertices to be visited in this sweep, the next on top; those of the next sweep.
     pass: Vec<u32>,
@@ -96,14 +115,15 @@ struct Cuts {
 }
 
 impl<'a> Codec<'a> {
-    fn new(head: &'a MeshHead, walk: &'a mut Walk, first: Counts) -> Self {
+    fn new(head: &'a MeshHead, state: &'a mut Sequel, first: Counts) -> Self {
+        let Sequel { walk, residuals, m } = state;
         Codec {
             head,
             first_vertex: walk.vertices.len(),
             walk,
-            residuals: Residuals::new(head.double, &head.lattices),
+            residuals,
             extras: Extras::new(head, first.wedge),
-            m: Models::default(),
+            m,
             ring: Ring::default(),
             pass: Vec::new(),
             list: Vec::new(),
@@ -424,8 +444,8 @@ impl<'a> Codec<'a> {
             }
         }
         let n = (cuts.count + 1) as f64;
-        // Where both are placed anew, or many faces are handed over, the old place is amid them: fitted to bunny, horse, igea and dragon.
-        let at = if moves || cuts.count > 4 {
+        // Where both are placed anew the old place is between them: fitted to bunny, horse and igea.
+        let at = if moves {
             std::array::from_fn(|a| 0.375 * (sum[a] / n) + 0.625 * t[a])
         } else {
             std::array::from_fn(|a| (sum[a] + t[a]) / (n + 1.0))
@@ -469,7 +489,7 @@ fn rank<C: Coder>(c: &mut C, m: &mut Nibble, far: &mut Number, value: usize) -> 
 pub(super) fn write(
     head: &MeshHead,
     pm: &ProgressiveMesh,
-    walk: &mut Walk,
+    state: &mut Sequel,
     first: Counts,
     count: usize,
 ) -> Option<(Vec<u8>, Sizes)> {
@@ -477,7 +497,7 @@ pub(super) fn write(
     let range = first.split..first.split + count;
     let levels = pm.splits.error[range.clone()].iter().map(|&e| error_level(e) as u16);
     let levels = levels.fold([NO_LEVEL, 0], |[a, b], l| [a.min(l), b.max(l)]);
-    let mut codec = Codec::new(head, walk, first);
+    let mut codec = Codec::new(head, state, first);
     codec.begin(&mut streams, &pm.splits.vertex[range], levels, count)?;
     let mut source = Some(Source { pm, fans: None, at: first });
     let mut nothing = SplitBlock::default();
@@ -500,15 +520,15 @@ pub(super) fn write(
 /// Reads a chunk that `walk` stands before. `None`: damage, and the walk is void.
 pub(super) fn read(
     head: &MeshHead,
-    walk: &mut Walk,
+    state: &mut Sequel,
     (first, first_face): (u32, u32),
     count: usize,
     raw: u64,
     mut bytes: &[u8],
 ) -> Option<SplitBlock> {
     let end = (first as u64).checked_add(count as u64)?;
-    let here = head.base_vertices as usize + first as usize == walk.vertices.len()
-        && first_face as usize == walk.face_count();
+    let here = head.base_vertices as usize + first as usize == state.walk.vertices.len()
+        && first_face as usize == state.walk.face_count();
     if end > head.splits as u64 || !here {
         return None;
     }
@@ -534,7 +554,7 @@ pub(super) fn read(
         moved_positions: places::empty(head.double),
         ..Default::default()
     };
-    let mut codec = Codec::new(head, walk, at);
+    let mut codec = Codec::new(head, state, at);
     codec.begin(&mut streams, &[], [0; 2], count)?;
     for _ in 0..count {
         codec.split(&mut streams, &mut None, &mut out)?;

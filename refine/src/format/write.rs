@@ -5,9 +5,8 @@ use super::container::{Chunk, ChunkType, Directory, EXPANSION};
 use super::input_order;
 use super::lattice;
 use super::plan::{Piece, Plan};
-use super::sequel;
+use super::sequel::{self, Sequel};
 use super::splits::{self, Counts, Fans};
-use super::walk::Walk;
 use crate::progressive::{Damage, ProgressiveMesh, RowsOf};
 
 /// How to write.
@@ -191,7 +190,7 @@ fn encode_mesh(
     let mut base = part(ChunkType::BASE, true, m, base::raw_bytes(&head), base::write(&head, &mut pm)?);
     base.chunk.count = head.base_vertices;
     let fans = if options.alone { Some(Fans::new(&pm).ok()?) } else { None };
-    let mut walk = Walk::new(&pm);
+    let mut state = Sequel::new(&head, &pm);
     let starts = starts(&pm, &pm.rows_of_splits(), &plan.pieces);
     let pack = |piece: &Piece, ends: &[Counts], kind: ChunkType, bytes: Vec<u8>| {
         let (first, end) = (ends[0], ends[1]);
@@ -219,7 +218,7 @@ fn encode_mesh(
         }
         None => {
             let one = |(piece, ends): (&Piece, &[Counts])| {
-                let (bytes, _) = sequel::write(&head, &pm, &mut walk, ends[0], piece.count)?;
+                let (bytes, _) = sequel::write(&head, &pm, &mut state, ends[0], piece.count)?;
                 Some(pack(piece, ends, ChunkType::SEQUEL, bytes))
             };
             jobs.into_iter().map(one).collect()
