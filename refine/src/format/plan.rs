@@ -4,6 +4,7 @@
 //! put in the order of their descent (a vertex's descendants side by side), and a chunk takes the splits of a run of them. A split
 //! that depends on one of a later chunk of its band waits for that chunk. Within a chunk splits come in sweeps over its vertices ([`super::sweep`]).
 
+use super::places;
 use super::splits::error_level;
 use crate::aif::NONE;
 use crate::progressive::ProgressiveMesh;
@@ -61,8 +62,8 @@ impl Forest {
 }
 
 impl Plan {
-    /// `None` if the splits refer to what does not exist.
-    pub(super) fn new(pm: &ProgressiveMesh) -> Option<Plan> {
+    /// A chunk's roots come by number if chunks are read alone, else along the curve. `None` if the splits refer to what does not exist.
+    pub(super) fn new(pm: &ProgressiveMesh, alone: bool) -> Option<Plan> {
         let n = pm.splits.len();
         let n0 = pm.base_vertices();
         if pm.splits.vertex.iter().zip(n0..).any(|(&v, count)| v as usize >= count) {
@@ -88,6 +89,7 @@ impl Plan {
             chunk: vec![u32::MAX; n],
             slot: (0..n0 as u32).chain(std::iter::repeat_n(NONE, n)).collect(),
             order: Vec::with_capacity(n),
+            curve: (!alone).then(|| Curve::new(pm)),
         };
         let mut plan = Plan::default();
         let segments = if pm.levels.len() > 2 { 1 } else { SEGMENTS };
@@ -208,18 +210,44 @@ fn bands(pm: &ProgressiveMesh, rank: &[u32]) -> Vec<u32> {
     bands
 }
 
+/// Places along a curve through space, coarsely: in a box, by the bits of its coordinates in turn (Morton 1966).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Curve {
+    low: [f64; 3],
+    scale: f64,
+}
+
+impl Curve {
+    /// Through the box of the base.
+    pub(super) fn new(pm: &ProgressiveMesh) -> Self {
+        let (low, high) = pm.base_positions.bounds().unwrap_or_default();
+        let side = (high - low).max_element();
+        let scale = if side > 0.0 { 1023.0 / side } else { 0.0 };
+        Curve { low: low.to_array(), scale: if scale.is_finite() { scale } else { 0.0 } }
+    }
+
+    /// Where on the curve.
+    #[inline]
+    pub(super) fn at(&self, p: [f64; 3]) -> u32 {
+        let spread = |axis: usize| {
+            let x = ((p[axis] - self.low[axis]) * self.scale) as u32;
+            let mut x = x.min(1023);
+            x = (x | x << 16) & 0x0300_00FF;
+            x = (x | x << 8) & 0x0300_F00F;
+            x = (x | x << 4) & 0x030C_30C3;
+            (x | x << 2) & 0x0924_9249
+        };
+        spread(0) | spread(1) << 1 | spread(2) << 2
+    }
+}
+
 /// The place of every vertex in the order of descent: those of the base along a curve through space, every other behind the one it is
 /// split from.
 fn ranks(pm: &ProgressiveMesh) -> Vec<u32> {
     let n0 = pm.base_vertices();
-    let mut base: Vec<(u64, u32)> = Vec::with_capacity(n0);
-    let (low, high) = pm.base_positions.bounds().unwrap_or_default();
-    let scale = 1023.0 / (high - low).max_element().max(f64::MIN_POSITIVE);
-    for (p, v) in pm.base_positions.iter().zip(0..) {
-        let q = (p - low) * scale;
-        let spread = |x: f64| (0..10).map(|k| (x as u64 >> k & 1) << (3 * k)).sum::<u64>();
-        base.push((spread(q.x) | spread(q.y) << 1 | spread(q.z) << 2, v));
-    }
+    let curve = Curve::new(pm);
+    let mut base: Vec<(u32, u32)> =
+        (0..n0 as u32).map(|v| (curve.at(places::point(&pm.base_positions, v as usize)), v)).collect();
     base.sort_unstable();
     let mut next = vec![NONE; pm.vertices()];
     base.windows(2).for_each(|w| next[w[0].1 as usize] = w[1].1);
@@ -246,6 +274,8 @@ struct Schedule<'a> {
     /// Number in the file of a vertex, once it has one.
     slot: Vec<u32>,
     order: Vec<u32>,
+    /// Along which a chunk's roots come.
+    curve: Option<Curve>,
 }
 
 impl Schedule<'_> {
@@ -253,7 +283,7 @@ impl Schedule<'_> {
     fn add(&mut self, mut candidates: Vec<u32>, number: u32) -> Vec<u32> {
         candidates.sort_unstable();
         let n0 = self.pm.base_vertices();
-        let mut roots: Vec<(u32, u32)> = Vec::new();
+        let mut roots: Vec<(u32, u32, u32)> = Vec::new();
         candidates.retain(|&i| {
             let on = self.forest.on[i as usize];
             let can = on.iter().all(|&d| d == NONE || self.chunk[d as usize] != u32::MAX);
@@ -261,14 +291,18 @@ impl Schedule<'_> {
                 self.chunk[i as usize] = number;
                 if on[0] == NONE || self.chunk[on[0] as usize] != number {
                     let v = self.pm.splits.vertex[i as usize] as usize;
-                    roots.push((self.slot[v], i));
+                    let key = self.curve.map_or(0, |c| match v.checked_sub(n0) {
+                        Some(made) => c.at(places::point(&self.pm.new_positions, made)),
+                        None => c.at(places::point(&self.pm.base_positions, v)),
+                    });
+                    roots.push((key, self.slot[v], i));
                 }
             }
             !can
         });
         roots.sort_unstable();
         // A list of the vertices by the split that is to come at each.
-        let mut list: Vec<u32> = roots.into_iter().map(|r| r.1).collect();
+        let mut list: Vec<u32> = roots.into_iter().map(|r| r.2).collect();
         let mut pass = Vec::with_capacity(list.len());
         while !list.is_empty() {
             std::mem::swap(&mut list, &mut pass);

@@ -12,7 +12,7 @@ use super::splits::{
     CONNECTIVITY, Counts, ERROR_SHIFT, ERRORS, PLACES, STREAMS, Sizes, Source, SplitBlock,
     error_level,
 };
-use super::walk::{Edge, NO_LEVEL, Ring, Walk};
+use super::walk::{Cut, NO_LEVEL, Ring, Walk, cut, turn};
 use crate::aif::NONE;
 use crate::progressive::{ProgressiveMesh, SplitCode};
 
@@ -108,8 +108,8 @@ struct Codec<'a> {
 /// A split's cuts, as places in the ring.
 #[derive(Clone, Copy, Debug)]
 struct Cuts {
-    left: Edge,
-    right: Edge,
+    left: Cut,
+    right: Cut,
     first: usize,
     count: usize,
 }
@@ -139,7 +139,7 @@ impl<'a> Codec<'a> {
     fn begin<C: Coder>(
         &mut self,
         c: &mut [C; STREAMS],
-        vertices: &[u32],
+        of: &[u32],
         levels: [u16; 2],
         count: usize,
     ) -> Option<()> {
@@ -147,7 +147,7 @@ impl<'a> Codec<'a> {
         self.levels[1] = c[ERRORS].plain(16, levels[1] as u32) as u16;
         let c = &mut c[CONNECTIVITY];
         let first = self.first_vertex as u32;
-        let mut roots: Vec<u32> = vertices.iter().copied().filter(|&v| v < first).collect();
+        let mut roots: Vec<u32> = of.iter().copied().filter(|&v| v < first).collect();
         roots.sort_unstable();
         roots.dedup();
         let number = c.number(&mut self.m.roots, roots.len() as u64);
@@ -165,11 +165,13 @@ impl<'a> Codec<'a> {
                 return None;
             }
         }
-        self.pass.reverse();
+        // Along the curve, so that what is near is near in memory too; the first on top.
+        let vertices = &self.walk.vertices;
+        self.pass.sort_unstable_by_key(|&v| std::cmp::Reverse((vertices[v as usize].key, v)));
         if !C::READS {
-            self.to_come = vec![0; vertices.len() + roots.len()];
+            self.to_come = vec![0; of.len() + roots.len()];
             self.roots = roots;
-            for &v in vertices {
+            for &v in of {
                 *self.left(v)? += 1;
             }
         }
@@ -261,7 +263,7 @@ impl<'a> Codec<'a> {
             moved = Some(self.residuals.code(&mut c[PLACES], 2, &guess, to));
         }
         if C::READS {
-            let name = |e: Edge| e.name().map_or(NONE, |n| n.0.code());
+            let name = |c: Cut| cut(c.name().0);
             out.splits.vertex.push(v);
             out.splits.left.push(name(cuts.left));
             out.splits.right.push(if two { name(cuts.right) } else { NONE });
@@ -271,13 +273,10 @@ impl<'a> Codec<'a> {
             moved.iter().for_each(|&to| places::push(&mut out.moved_positions, to));
         }
         let u = self.walk.vertices.len() as u32;
-        for e in [cuts.left, cuts.right].into_iter().take(1 + two as usize) {
-            if let Some(h) = e.inner.or(e.outer) {
-                let tip = self.walk.far(h) as usize;
-                self.walk.vertices[tip].visit |= TOUCHED;
-            }
+        let tips = self.walk.split(v, (cuts.left, cuts.right), cuts.count, code, (place, level));
+        for tip in tips.into_iter().take(1 + two as usize) {
+            self.walk.vertices[tip as usize].visit |= TOUCHED;
         }
-        self.walk.split(v, (cuts.left, cuts.right), cuts.count, code, (place, level));
         if let Some(to) = moved {
             self.walk.places[v as usize] = to;
         }
@@ -306,7 +305,7 @@ impl<'a> Codec<'a> {
         two: bool,
         source: &Option<Source<'_>>,
     ) -> Option<(SplitCode, Cuts)> {
-        let start = self.walk.start(v)?;
+        let start = Some(self.walk.start(v)).filter(|&h| h != NONE)?;
         self.walk.ring(start, &mut self.ring);
         let mut want = None;
         let (mut rest, mut moves) = (0, false);
@@ -316,7 +315,7 @@ impl<'a> Codec<'a> {
             (rest, moves) = ((code.0 & !TOLD) as u32, code.moves());
             want = self.find(two, splits.left[i], splits.right[i], code);
             if want.is_none() {
-                self.walk.ring(start.turn(), &mut self.ring);
+                self.walk.ring(turn(start), &mut self.ring);
                 want = self.find(two, splits.left[i], splits.right[i], code);
                 rest |= if want.is_some() { TURNED } else { NAMED };
             }
@@ -336,13 +335,16 @@ impl<'a> Codec<'a> {
             self.named(c, v, two, source)?
         } else {
             if C::READS && rest & TURNED != 0 {
-                self.walk.ring(start.turn(), &mut self.ring);
+                self.walk.ring(turn(start), &mut self.ring);
             }
             self.counted(c, state, two, want)?
         };
-        let (left, inner) = cuts.left.name()?;
-        code |= if inner { SplitCode::L_INNER } else { 0 } | if left.starts { SplitCode::L_STARTS } else { 0 };
-        if two && cuts.right.name()?.1 {
+        let (left, inner) = cuts.left.name();
+        if left == NONE {
+            return None;
+        }
+        code |= if inner { SplitCode::L_INNER } else { 0 } | if left & 1 == 1 { SplitCode::L_STARTS } else { 0 };
+        if two && cuts.right.name().1 {
             code |= SplitCode::R_INNER;
         }
         Some((SplitCode(code), cuts))
@@ -350,20 +352,16 @@ impl<'a> Codec<'a> {
 
     /// Where in the ring the writer's cuts are.
     fn find(&self, two: bool, left: u32, right: u32, code: SplitCode) -> Option<(usize, usize)> {
-        let n = self.ring.far.len();
-        let first = (0..n).find(|&k| {
-            self.ring.left(k).name().is_some_and(|(h, inner)| {
-                h.code() == left && inner == code.left_inner() && h.starts == code.left_starts()
-            })
-        })?;
-        let faces = self.ring.entries.len();
+        let faces = self.ring.faces();
+        let left = (left >> 2) << 3 | (left & 3) << 1 | code.left_starts() as u32;
+        let first = (0..self.ring.edges()).find(|&k| self.ring.left(k).name() == (left, code.left_inner()))?;
         if !two {
             return (!self.ring.closed).then_some((first, faces - first));
         }
         let most = if self.ring.closed { faces - 1 } else { faces - first };
         let count = (1..=most).find(|&k| {
-            let named = self.ring.right(first, k).name();
-            named.is_some_and(|(h, inner)| h.code() == right && inner == code.right_inner())
+            let (h, inner) = self.ring.right(first, k).name();
+            cut(h) == right && inner == code.right_inner()
         })?;
         Some((first, count))
     }
@@ -376,7 +374,7 @@ impl<'a> Codec<'a> {
         two: bool,
         want: Option<(usize, usize)>,
     ) -> Option<Cuts> {
-        let (faces, n) = (self.ring.entries.len(), self.ring.far.len());
+        let (faces, n) = (self.ring.faces(), self.ring.edges());
         let class = valence_class(n);
         let (first, count) = want.unwrap_or_default();
         let model = &mut self.m.rank[state.min(2) as usize][class];
@@ -410,7 +408,7 @@ impl<'a> Codec<'a> {
         let inner = c.bit(&mut self.m.inner[0], code.left_inner());
         let starts = c.bit(&mut self.m.inner[1], code.left_starts());
         let half = self.walk.named(left, starts, v)?;
-        let begin = if inner { half } else { self.walk.across(half).unwrap_or(half.turn()) };
+        let begin = if inner { half } else { Some(self.walk.across(half)).filter(|&h| h != NONE).unwrap_or(turn(half)) };
         self.walk.ring(begin, &mut self.ring);
         if two {
             right = u32::try_from(c.number(&mut self.m.named[1], right as u64)).ok()?;
@@ -459,7 +457,7 @@ impl<'a> Codec<'a> {
         let t = places[v as usize];
         let [l, r] = [cuts.first, cuts.first + cuts.count].map(|k| places[ring.far(k) as usize]);
         let tips: [f64; 3] = std::array::from_fn(|a| 0.5 * (l[a] + r[a]));
-        let edges = ring.far.len();
+        let edges = ring.edges();
         let kept = if ring.closed { edges.saturating_sub(cuts.count + 1) } else { 0 };
         let mut sum = [0.0; 3];
         for k in 1..=kept {

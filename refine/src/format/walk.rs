@@ -1,12 +1,33 @@
 //! The mesh between two splits, as far as coding the next one needs it: faces with their links, and where vertices are.
+//!
+//! An edge of a face seen from a vertex at one of its ends is a *half*, packed as `face << 3 | edge << 1 | starts`, where `starts` says that the face
+//! begins the edge there; [`NONE`] for none. A link is the half across, seen from the vertex where the face ends the edge.
 
 use super::places;
+use super::plan::Curve;
 use crate::aif::NONE;
-use crate::progressive::links::{Half, across, link, link_faces, previous};
+use crate::progressive::links::link_faces;
 use crate::progressive::{ProgressiveMesh, SplitCode};
 
 /// A face: corners (vertices) in 0..3, links in 4..7; half a cache line.
 type Face = [u32; 8];
+
+/// By the low bits of a half: those of the face's other edge at the vertex, the corner at the vertex, that at the edge's other end.
+const TURN: [u32; 8] = [3, 4, 5, 0, 1, 2, 0, 0];
+const NEAR: [u8; 8] = [1, 0, 2, 1, 0, 2, 0, 0];
+const FAR: [u8; 8] = [0, 1, 1, 2, 2, 0, 0, 0];
+
+/// The face's other edge at the vertex.
+#[inline]
+pub(super) fn turn(h: u32) -> u32 {
+    h & !7 | TURN[(h & 7) as usize]
+}
+
+/// A half without its vertex, as references name it: `face << 2 | edge`.
+#[inline]
+pub(super) fn cut(h: u32) -> u32 {
+    h >> 3 << 2 | h >> 1 & 3
+}
 
 /// No error yet.
 pub(super) const NO_LEVEL: u16 = u16::MAX;
@@ -14,8 +35,10 @@ pub(super) const NO_LEVEL: u16 = u16::MAX;
 /// What is known of a vertex, beside where it is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Vertex {
-    /// A half-edge with which its ring begins, `face << 3 | edge << 1 | starts`; [`NONE`] for a vertex without faces.
+    /// The half with which its ring begins; [`NONE`] for a vertex without faces.
     at: u32,
+    /// Where on the curve it was made.
+    pub(super) key: u32,
     /// Faces around it.
     pub(super) valence: u16,
     /// The level of the last error of a split of it, or of that which made it.
@@ -25,67 +48,78 @@ pub(super) struct Vertex {
 }
 
 /// The mesh.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Walk {
     faces: Vec<Face>,
     pub(super) vertices: Vec<Vertex>,
     pub(super) places: Vec<[f64; 3]>,
+    curve: Curve,
 }
 
 /// The edges around a vertex, in turn.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ring {
-    /// The faces around the vertex, each by the edge by which it is entered.
-    pub(super) entries: Vec<Half>,
-    /// The vertices at the other ends of the edges; one more than faces if the ring is open.
-    pub(super) far: Vec<u32>,
+    /// Each as the half by which the face behind it is entered, and the vertex at its other end. Of an open ring the last has no face behind it.
+    edges: Vec<(u32, u32)>,
     pub(super) closed: bool,
 }
 
-/// An edge of a ring as a cut.
+/// An edge of a ring as a cut: as a half of the face that goes to the new vertex and of that which stays, as far as they are there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Edge {
-    pub(super) inner: Option<Half>,
-    pub(super) outer: Option<Half>,
+pub(super) struct Cut {
+    pub(super) inner: u32,
+    pub(super) outer: u32,
 }
 
-impl Edge {
-    /// The later-made of its faces, and whether that is the one that goes to the new vertex.
+impl Cut {
+    /// The half in the later-made of its faces, and whether that goes to the new vertex.
     #[inline]
-    pub(super) fn name(self) -> Option<(Half, bool)> {
-        match (self.inner, self.outer) {
-            (Some(i), Some(o)) if o.face > i.face => Some((o, false)),
-            (Some(i), _) => Some((i, true)),
-            (None, o) => o.map(|o| (o, false)),
-        }
+    pub(super) fn name(self) -> (u32, bool) {
+        let inner = self.inner != NONE && (self.outer == NONE || self.outer >> 3 <= self.inner >> 3);
+        (if inner { self.inner } else { self.outer }, inner)
     }
 }
 
 impl Ring {
+    /// Edges.
+    #[inline]
+    pub(super) fn edges(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// Faces.
+    #[inline]
+    pub(super) fn faces(&self) -> usize {
+        self.edges.len() - !self.closed as usize
+    }
+
     /// Edge `k` as a left cut: the face behind it goes to the new vertex.
     #[inline]
-    pub(super) fn left(&self, k: usize) -> Edge {
-        let before = if k > 0 {
-            Some(self.entries[k - 1].turn())
-        } else {
-            self.entries.last().filter(|_| self.closed).map(|h| h.turn())
+    pub(super) fn left(&self, k: usize) -> Cut {
+        let before = match k {
+            0 if self.closed => self.edges.last().map_or(NONE, |e| turn(e.0)),
+            0 => NONE,
+            _ => turn(self.edges[k - 1].0),
         };
-        Edge { inner: self.entries.get(k).copied(), outer: before }
+        Cut { inner: self.edges[k].0, outer: before }
     }
 
     /// The edge `count` faces behind edge `k`, as a right cut.
     #[inline]
-    pub(super) fn right(&self, k: usize, count: usize) -> Edge {
-        let at = |i: usize| if i >= self.entries.len() && self.closed { i - self.entries.len() } else { i };
-        let edge = self.left(at(k + count));
-        Edge { inner: edge.outer, outer: edge.inner }
+    pub(super) fn right(&self, k: usize, count: usize) -> Cut {
+        let c = self.left(self.around(k + count));
+        Cut { inner: c.outer, outer: c.inner }
     }
 
     /// The vertex at the other end of edge `k`, which may be counted once around.
     #[inline]
     pub(super) fn far(&self, k: usize) -> u32 {
-        let n = self.far.len();
-        self.far[if k >= n { k - n } else { k }]
+        self.edges[self.around(k)].1
+    }
+
+    #[inline]
+    fn around(&self, k: usize) -> usize {
+        if k >= self.edges.len() { k - self.edges.len() } else { k }
     }
 }
 
@@ -96,8 +130,10 @@ impl Walk {
         let vertex = |w: u32| pm.wedges.as_ref().map_or(w, |s| s.base_vertex[w as usize]);
         let corners: Vec<[u32; 3]> = pm.base_faces.iter().map(|f| f.map(vertex)).collect();
         let links = link_faces(&corners, n0);
-        let empty = Vertex { at: NONE, valence: 0, level: NO_LEVEL, visit: 0 };
-        let mut vertices = vec![empty; n0];
+        let curve = Curve::new(pm);
+        let places: Vec<[f64; 3]> = (0..n0).map(|i| places::point(&pm.base_positions, i)).collect();
+        let lone = |&p: &[f64; 3]| Vertex { at: NONE, key: curve.at(p), valence: 0, level: NO_LEVEL, visit: 0 };
+        let mut vertices: Vec<Vertex> = places.iter().map(lone).collect();
         for (f, corners) in (0u32..).zip(&corners) {
             for (k, &v) in (0u32..).zip(corners) {
                 let v = &mut vertices[v as usize];
@@ -108,10 +144,13 @@ impl Walk {
             }
         }
         let faces = corners.iter().zip(&links);
+        // Cursors keep links as `face << 3 | same << 2 | edge`.
+        let pack = |l: u32| if l == NONE { NONE } else { l & !7 | (l & 3) << 1 | !l >> 2 & 1 };
         Walk {
-            faces: faces.map(|(c, l)| [c[0], c[1], c[2], 0, l[0], l[1], l[2], 0]).collect(),
+            faces: faces.map(|(c, l)| [c[0], c[1], c[2], 0, pack(l[0]), pack(l[1]), pack(l[2]), 0]).collect(),
             vertices,
-            places: (0..n0).map(|i| places::point(&pm.base_positions, i)).collect(),
+            places,
+            curve,
         }
     }
 
@@ -119,140 +158,163 @@ impl Walk {
         self.faces.len()
     }
 
+    /// The same edge in the face across.
     #[inline]
-    fn link_at(&self, h: Half) -> u32 {
-        self.faces[h.face as usize][4 + (h.edge & 3) as usize]
-    }
-
-    #[inline]
-    pub(super) fn across(&self, h: Half) -> Option<Half> {
-        across(h, self.link_at(h))
+    pub(super) fn across(&self, h: u32) -> u32 {
+        let link = self.faces[(h >> 3) as usize][4 + (h >> 1 & 3) as usize];
+        if link == NONE { NONE } else { link ^ h & 1 }
     }
 
     /// The vertex at the other end.
     #[inline]
-    pub(super) fn far(&self, h: Half) -> u32 {
-        self.faces[h.face as usize][h.far_corner() & 3]
+    pub(super) fn far(&self, h: u32) -> u32 {
+        self.faces[(h >> 3) as usize][FAR[(h & 7) as usize] as usize]
     }
 
-    /// The vertex that `h` is seen from.
+    /// The half that `cut` names, seen from `v`.
+    pub(super) fn named(&self, cut: u32, starts: bool, v: u32) -> Option<u32> {
+        let face = self.faces.get((cut >> 2) as usize)?;
+        let h = (cut >> 2) << 3 | (cut & 3) << 1 | starts as u32;
+        (cut & 3 < 3 && face[NEAR[(h & 7) as usize] as usize] == v).then_some(h)
+    }
+
+    /// Where the ring of `v` begins; [`NONE`] if it has no faces.
     #[inline]
-    pub(super) fn near(&self, h: Half) -> u32 {
-        self.faces[h.face as usize][h.corner() & 3]
-    }
-
-    /// The half-edge `cut` (`face << 2 | edge`) names, seen from `v`.
-    pub(super) fn named(&self, cut: u32, starts: bool, v: u32) -> Option<Half> {
-        let h = Half { face: cut >> 2, edge: cut & 3, starts };
-        (h.edge < 3 && (h.face as usize) < self.faces.len() && self.near(h) == v).then_some(h)
-    }
-
-    /// Where the ring of `v` begins.
-    #[inline]
-    pub(super) fn start(&self, v: u32) -> Option<Half> {
-        let at = self.vertices[v as usize].at;
-        (at != NONE).then_some(Half { face: at >> 3, edge: at >> 1 & 3, starts: at & 1 == 1 })
+    pub(super) fn start(&self, v: u32) -> u32 {
+        self.vertices[v as usize].at
     }
 
     /// The ring from `start` on; from the border on if there is one.
     #[inline]
-    pub(super) fn ring(&self, start: Half, ring: &mut Ring) {
-        ring.entries.clear();
-        ring.far.clear();
-        ring.closed = true;
+    pub(super) fn ring(&self, start: u32, ring: &mut Ring) {
+        ring.edges.clear();
         let mut entry = start;
-        loop {
-            ring.entries.push(entry);
-            ring.far.push(self.far(entry));
-            let exit = entry.turn();
-            match self.across(exit) {
-                Some(next) if next == start => return,
-                Some(next) => entry = next,
-                None => {
-                    ring.far.push(self.far(exit));
-                    break;
-                }
+        let exit = loop {
+            let face = &self.faces[(entry >> 3) as usize];
+            let low = (entry & 7) as usize;
+            ring.edges.push((entry, face[FAR[low] as usize]));
+            let exit = TURN[low];
+            let link = face[4 + (exit >> 1 & 3) as usize];
+            if link == NONE {
+                break turn(entry);
             }
-        }
+            entry = link ^ exit & 1;
+            if entry == start {
+                ring.closed = true;
+                return;
+            }
+        };
         ring.closed = false;
-        let (mut before, mut back) = (start, 0);
-        while let Some(exit) = self.across(before) {
-            before = exit.turn();
-            ring.entries.push(before);
-            ring.far.push(self.far(before));
-            back += 1;
+        ring.edges.push((NONE, self.far(exit)));
+        let (n, mut before) = (ring.edges.len(), start);
+        loop {
+            let exit = self.across(before);
+            if exit == NONE {
+                break;
+            }
+            before = turn(exit);
+            ring.edges.push((before, self.far(before)));
         }
-        let (n, m) = (ring.entries.len(), ring.far.len());
-        ring.entries[n - back..].reverse();
-        ring.far[m - back..].reverse();
-        ring.entries.rotate_right(back);
-        ring.far.rotate_right(back);
+        let back = ring.edges.len() - n;
+        ring.edges[n..].reverse();
+        ring.edges.rotate_right(back);
     }
 
-    /// Does a split of `v`: the `count` faces from `left.inner` on go to the new vertex, which is at `place`.
+    /// Does a split of `v`: the `count` faces from `left.inner` on go to the new vertex, which is at `place`. Returns the tips.
     #[inline]
     pub(super) fn split(
         &mut self,
         v: u32,
-        (left, right): (Edge, Edge),
+        (left, right): (Cut, Cut),
         count: usize,
         code: SplitCode,
         (place, level): ([f64; 3], u16),
-    ) {
+    ) -> [u32; 2] {
         let u = self.vertices.len() as u32;
         let two = code.two_faces();
-        let tip = |e: Edge| e.inner.or(e.outer).map_or(NONE, |h| self.far(h));
-        let tips = [tip(left), tip(right)];
+        let tips = [left, right].map(|c| c.name().0).map(|h| if h == NONE { NONE } else { self.far(h) });
         let mut entry = left.inner;
         for _ in 0..count {
-            let Some(h) = entry else { break };
-            self.faces[h.face as usize][h.corner() & 3] = u;
-            entry = self.across(h.turn());
+            if entry == NONE {
+                break;
+            }
+            self.faces[(entry >> 3) as usize][NEAR[(entry & 7) as usize] as usize] = u;
+            entry = self.across(turn(entry));
         }
-        let (l, old, new) = self.insert(code.left().1, [v, u, tips[0]], left);
-        let mut at_u = Half { edge: 1, starts: code.left().1, ..new };
+        let (l, old, mut at_u) = self.insert(code.left().1, [v, u, tips[0]], left);
         if two {
             let (r, _, new) = self.insert(code.right().1, [v, u, tips[1]], right);
             self.connect(l, r);
             at_u = new;
+        } else {
+            // At the border, by the edge between both.
+            at_u = turn(at_u);
         }
-        let pack = |h: Half| h.face << 3 | h.edge << 1 | h.starts as u32;
         let valence = (count + 1 + two as usize).min(u16::MAX as usize) as u16;
-        self.vertices.push(Vertex { at: pack(at_u), valence, level, visit: 0 });
-        let old_vertex = &mut self.vertices[v as usize];
-        old_vertex.at = pack(old);
-        old_vertex.level = level;
-        old_vertex.valence = old_vertex.valence.saturating_add(1 + two as u16).saturating_sub(count as u16);
+        self.vertices.push(Vertex { at: at_u, key: self.curve.at(place), valence, level, visit: 0 });
+        let vertex = &mut self.vertices[v as usize];
+        (vertex.at, vertex.level) = (old, level);
+        vertex.valence = vertex.valence.saturating_add(1 + two as u16).saturating_sub(count as u16);
         for t in &tips[..1 + two as usize] {
             if let Some(t) = self.vertices.get_mut(*t as usize) {
                 t.valence = t.valence.saturating_add(1);
             }
         }
         self.places.push(place);
+        tips
     }
 
     /// Appends a face (tip first) into an opening; returns its edge between old and new vertex, that between the tip and the old one, both seen from
     /// the old, and that between the tip and the new one, seen from that.
     #[inline]
-    fn insert(&mut self, new_next: bool, [v, u, tip]: [u32; 3], at: Edge) -> (Half, Half, Half) {
+    fn insert(&mut self, new_next: bool, [v, u, tip]: [u32; 3], at: Cut) -> (u32, u32, u32) {
         let face = self.faces.len() as u32;
         let (b, c) = if new_next { (u, v) } else { (v, u) };
         self.faces.push([tip, b, c, 0, NONE, NONE, NONE, 0]);
-        let after = Half { face, edge: 0, starts: false };
-        let before = Half { face, edge: previous(0) as u32, starts: true };
+        // Edge 0 ends at corner 1, edge 2 begins at corner 2.
+        let (after, before) = (face << 3, face << 3 | 2 << 1 | 1);
         let (old, new) = if new_next { (before, after) } else { (after, before) };
-        if let Some(outer) = at.outer {
-            self.connect(old, outer);
+        if at.outer != NONE {
+            self.connect(old, at.outer);
         }
-        if let Some(inner) = at.inner {
-            self.connect(new, inner);
+        if at.inner != NONE {
+            self.connect(new, at.inner);
         }
-        (Half { face, edge: 1, starts: !new_next }, old, new)
+        (face << 3 | 1 << 1 | !new_next as u32, old, new)
     }
 
+    /// Links two halves, both seen from the same vertex.
     #[inline]
-    fn connect(&mut self, x: Half, y: Half) {
-        self.faces[x.face as usize][4 + (x.edge & 3) as usize] = link(x, y);
-        self.faces[y.face as usize][4 + (y.edge & 3) as usize] = link(y, x);
+    fn connect(&mut self, x: u32, y: u32) {
+        self.faces[(x >> 3) as usize][4 + (x >> 1 & 3) as usize] = y ^ x & 1;
+        self.faces[(y >> 3) as usize][4 + (y >> 1 & 3) as usize] = x ^ y & 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progressive::links::{Half, across, link};
+
+    #[test]
+    fn packed_halves_are_those_of_cursors() {
+        for (edge, starts) in (0..3).flat_map(|e| [(e, false), (e, true)]) {
+            let pack = |h: Half| h.face << 3 | h.edge << 1 | h.starts as u32;
+            let h = Half { face: 5, edge, starts };
+            let low = (pack(h) & 7) as usize;
+            assert_eq!(turn(pack(h)), pack(h.turn()));
+            assert_eq!(NEAR[low] as usize, h.corner());
+            assert_eq!(FAR[low] as usize, h.far_corner());
+            assert_eq!(cut(pack(h)), h.code());
+            for starts in [false, true] {
+                let to = Half { face: 9, edge: 1, starts };
+                let l = pack(to) ^ pack(h) & 1;
+                assert_eq!(across(h, link(h, to)), Some(to));
+                assert_eq!(l ^ pack(h) & 1, pack(to));
+                // As `Walk::new` makes it of a cursor's link.
+                let packed = link(h, to);
+                assert_eq!(packed & !7 | (packed & 3) << 1 | !packed >> 2 & 1, l);
+            }
+        }
     }
 }

@@ -158,18 +158,21 @@ fn encode_mesh(
     turns: &[u32],
     options: &EncodeOptions,
 ) -> Option<MeshParts> {
-    let plan = Plan::new(source)?;
+    let (mut lattices, mut quantisation_error, mut flat_faces) = (Vec::new(), 0.0, 0);
+    let mut quantised = None;
+    if let Some(bits) = options.quantize.filter(|_| source.base_vertices() > 0) {
+        let pm = quantised.insert(source.clone());
+        let (grid, error) = lattice::quantise(pm, bits)?;
+        lattices.push(grid);
+        (quantisation_error, flat_faces) = (error, lattice::flat_faces(pm)?);
+    }
+    let source = quantised.as_ref().unwrap_or(source);
+    let plan = Plan::new(source, options.alone)?;
     let mut pm = source.reordered(&plan.order).ok()?;
     let tips = input_order::tips(&pm);
     input_order::turn(&mut pm, &tips, true);
-    let (mut lattices, mut quantisation_error, mut flat_faces) = (Vec::new(), 0.0, 0);
-    match options.quantize {
-        Some(bits) if pm.base_vertices() > 0 => {
-            let (grid, error) = lattice::quantise(&mut pm, bits)?;
-            lattices.push(grid);
-            (quantisation_error, flat_faces) = (error, lattice::flat_faces(&pm)?);
-        }
-        _ => lattices.extend(lattice::find(&pm)),
+    if lattices.is_empty() {
+        lattices = lattice::find(&pm);
     }
     let head = MeshHead {
         splits: pm.splits.len() as u32,
