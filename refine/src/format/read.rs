@@ -92,7 +92,10 @@ impl Part {
             // Splits that were read alone came before.
             return None;
         }
-        let state = self.sequel.get_or_insert_with(|| Sequel::new(&self.head, &self.mesh));
+        let state = match &mut self.sequel {
+            Some(state) => state,
+            none => none.insert(Sequel::new(&self.head, &self.mesh)?),
+        };
         let at = (chunk.first, chunk.first_face);
         sequel::read(&self.head, state, at, chunk.count as usize, chunk.raw, bytes)
     }

@@ -73,13 +73,13 @@ pub(super) struct Sequel {
 }
 
 impl Sequel {
-    /// At the base of `pm`.
-    pub(super) fn new(head: &MeshHead, pm: &ProgressiveMesh) -> Self {
-        Sequel {
-            walk: Walk::new(pm),
+    /// At the base of `pm`. `None` if that contradicts itself.
+    pub(super) fn new(head: &MeshHead, pm: &ProgressiveMesh) -> Option<Self> {
+        Some(Sequel {
+            walk: Walk::new(pm)?,
             residuals: Residuals::new(head.double, &head.lattices),
             m: Box::default(),
-        }
+        })
     }
 }
 
@@ -306,7 +306,7 @@ impl<'a> Codec<'a> {
         source: &Option<Source<'_>>,
     ) -> Option<(SplitCode, Cuts)> {
         let start = Some(self.walk.start(v)).filter(|&h| h != NONE)?;
-        self.walk.ring(start, &mut self.ring);
+        self.walk.ring(start, &mut self.ring)?;
         let mut want = None;
         let (mut rest, mut moves) = (0, false);
         if let Some(s) = source {
@@ -315,7 +315,7 @@ impl<'a> Codec<'a> {
             (rest, moves) = ((code.0 & !TOLD) as u32, code.moves());
             want = self.find(two, splits.left[i], splits.right[i], code);
             if want.is_none() {
-                self.walk.ring(turn(start), &mut self.ring);
+                self.walk.ring(turn(start), &mut self.ring)?;
                 want = self.find(two, splits.left[i], splits.right[i], code);
                 rest |= if want.is_some() { TURNED } else { NAMED };
             }
@@ -335,7 +335,7 @@ impl<'a> Codec<'a> {
             self.named(c, v, two, source)?
         } else {
             if C::READS && rest & TURNED != 0 {
-                self.walk.ring(turn(start), &mut self.ring);
+                self.walk.ring(turn(start), &mut self.ring)?;
             }
             self.counted(c, state, two, want)?
         };
@@ -409,7 +409,7 @@ impl<'a> Codec<'a> {
         let starts = c.bit(&mut self.m.inner[1], code.left_starts());
         let half = self.walk.named(left, starts, v)?;
         let begin = if inner { half } else { Some(self.walk.across(half)).filter(|&h| h != NONE).unwrap_or(turn(half)) };
-        self.walk.ring(begin, &mut self.ring);
+        self.walk.ring(begin, &mut self.ring)?;
         if two {
             right = u32::try_from(c.number(&mut self.m.named[1], right as u64)).ok()?;
             if c.bit(&mut self.m.inner[2], code.right_inner()) {

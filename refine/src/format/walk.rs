@@ -124,11 +124,19 @@ impl Ring {
 }
 
 impl Walk {
-    /// At the base.
-    pub(super) fn new(pm: &ProgressiveMesh) -> Self {
+    /// At the base. `None` if its faces refer to what does not exist.
+    pub(super) fn new(pm: &ProgressiveMesh) -> Option<Self> {
         let n0 = pm.base_vertices();
-        let vertex = |w: u32| pm.wedges.as_ref().map_or(w, |s| s.base_vertex[w as usize]);
-        let corners: Vec<[u32; 3]> = pm.base_faces.iter().map(|f| f.map(vertex)).collect();
+        let of_wedge = pm.wedges.as_ref().map(|s| &s.base_vertex);
+        let mut corners = pm.base_faces.clone();
+        for w in corners.as_flattened_mut() {
+            if let Some(of) = of_wedge {
+                *w = *of.get(*w as usize)?;
+            }
+            if *w as usize >= n0 {
+                return None;
+            }
+        }
         let links = link_faces(&corners, n0);
         let curve = Curve::new(pm);
         let places: Vec<[f64; 3]> = (0..n0).map(|i| places::point(&pm.base_positions, i)).collect();
@@ -146,12 +154,12 @@ impl Walk {
         let faces = corners.iter().zip(&links);
         // Cursors keep links as `face << 3 | same << 2 | edge`.
         let pack = |l: u32| if l == NONE { NONE } else { l & !7 | (l & 3) << 1 | !l >> 2 & 1 };
-        Walk {
+        Some(Walk {
             faces: faces.map(|(c, l)| [c[0], c[1], c[2], 0, pack(l[0]), pack(l[1]), pack(l[2]), 0]).collect(),
             vertices,
             places,
             curve,
-        }
+        })
     }
 
     pub(super) fn face_count(&self) -> usize {
@@ -184,12 +192,16 @@ impl Walk {
         self.vertices[v as usize].at
     }
 
-    /// The ring from `start` on; from the border on if there is one.
+    /// The ring from `start` on; from the border on if there is one. `None` for links that lead astray, as only damage makes them.
     #[inline]
-    pub(super) fn ring(&self, start: u32, ring: &mut Ring) {
+    pub(super) fn ring(&self, start: u32, ring: &mut Ring) -> Option<()> {
         ring.edges.clear();
+        let most = self.faces.len();
         let mut entry = start;
         let exit = loop {
+            if ring.edges.len() > most {
+                return None;
+            }
             let face = &self.faces[(entry >> 3) as usize];
             let low = (entry & 7) as usize;
             ring.edges.push((entry, face[FAR[low] as usize]));
@@ -201,7 +213,7 @@ impl Walk {
             entry = link ^ exit & 1;
             if entry == start {
                 ring.closed = true;
-                return;
+                return Some(());
             }
         };
         ring.closed = false;
@@ -212,12 +224,16 @@ impl Walk {
             if exit == NONE {
                 break;
             }
+            if ring.edges.len() > 2 * most + 1 {
+                return None;
+            }
             before = turn(exit);
             ring.edges.push((before, self.far(before)));
         }
         let back = ring.edges.len() - n;
         ring.edges[n..].reverse();
         ring.edges.rotate_right(back);
+        Some(())
     }
 
     /// Does a split of `v`: the `count` faces from `left.inner` on go to the new vertex, which is at `place`. Returns the tips.

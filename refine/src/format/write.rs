@@ -193,7 +193,6 @@ fn encode_mesh(
     let mut base = part(ChunkType::BASE, true, m, base::raw_bytes(&head), base::write(&head, &mut pm)?);
     base.chunk.count = head.base_vertices;
     let fans = if options.alone { Some(Fans::new(&pm).ok()?) } else { None };
-    let mut state = Sequel::new(&head, &pm);
     let starts = starts(&pm, &pm.rows_of_splits(), &plan.pieces);
     let pack = |piece: &Piece, ends: &[Counts], kind: ChunkType, bytes: Vec<u8>| {
         let (first, end) = (ends[0], ends[1]);
@@ -220,6 +219,7 @@ fn encode_mesh(
             super::each(jobs, one).into_iter().collect()
         }
         None => {
+            let mut state = Sequel::new(&head, &pm)?;
             let one = |(piece, ends): (&Piece, &[Counts])| {
                 let (bytes, _) = sequel::write(&head, &pm, &mut state, ends[0], piece.count)?;
                 Some(pack(piece, ends, ChunkType::SEQUEL, bytes))
