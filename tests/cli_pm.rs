@@ -168,6 +168,48 @@ fn damage_names_its_chunk_and_what_comes_before_can_be_saved() {
 }
 
 #[test]
+fn quantising_moves_vertices_by_no_more_than_it_says() {
+    let p = Place::new();
+    p.generate("scan", "in.ply", 3000);
+    let whole = p.done("encode in.ply whole.pm --json -q").json();
+    assert!(whole["quantization_error"].is_null());
+    let mut last = 0.0;
+    for bits in [14, 9] {
+        let e = p.done(&format!("encode in.ply q.pm --quantize {bits} --json -q")).json();
+        let said = e["quantization_error"].as_f64().unwrap();
+        assert!(said > 8.0 * last && e["bytes"].as_u64() < whole["bytes"].as_u64(), "{bits}: {said}");
+        p.done("decode q.pm q.ply -q");
+        // Faces are the input's, so vertices can only have moved: by something, and no more than said.
+        let c = p.done("compare in.ply q.ply --samples 20000 --json").json();
+        let farthest = c["worse"]["max"].as_f64().unwrap_or_else(|| panic!("{c}"));
+        assert!(farthest > 0.0 && farthest <= said, "{bits}: {farthest} of {said}");
+        let i = p.done("info q.pm --json").json();
+        assert_eq!(i["progressive"]["quantization_error"].as_f64(), Some(said));
+        assert_eq!(i["triangles"], p.done("info in.ply --json").json()["triangles"]);
+        last = said;
+    }
+    // Again from the file: the places lie on the grid already, so its places come back.
+    p.done("convert q.pm again.ply -q");
+    assert_eq!(p.read("again.ply"), p.read("q.ply"));
+}
+
+#[test]
+fn chunks_for_random_access_bring_the_same_mesh() {
+    let p = Place::new();
+    p.generate("cad", "in.obj", 3000);
+    p.done("encode in.obj in.pm -q");
+    p.done("encode in.obj alone.pm -q --random-access");
+    p.done("decode in.pm a.obj -q");
+    p.done("decode alone.pm b.obj -q");
+    assert_eq!(p.read("a.obj"), p.read("b.obj"));
+    assert!(p.read("in.pm").len() < p.read("alone.pm").len());
+    for (threads, name) in [(1, "one.pm"), (2, "two.pm")] {
+        p.done(&format!("encode in.obj {name} -q --threads {threads}"));
+        assert_eq!(p.read(name), p.read("in.pm"));
+    }
+}
+
+#[test]
 fn info_tells_where_the_bytes_go() {
     let p = Place::new();
     p.generate("scan", "in.ply", 2000);

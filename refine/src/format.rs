@@ -1,8 +1,9 @@
 //! The `.pm` file: progressive meshes as a stream of chunks. `FORMAT.md` specifies it.
 //!
 //! A file has a directory, the bases, then the splits, coarse to fine: by bands of error, within a band subtree by subtree. So every beginning that ends
-//! with a chunk is a mesh, each chunk is one range of bytes, and each can be read alone. [`encode`] writes, [`decode`] reads all,
-//! [`PmReader`] reads a stream as it arrives, [`RangeReader`] reads chunks in any order.
+//! with a chunk is a mesh, and each chunk is one range of bytes. By default a chunk refers to the mesh that those before it make, which takes a third of the bits for
+//! connectivity; with [`EncodeOptions::alone`] each can be read alone. [`encode`] writes, [`decode`] reads all, [`PmReader`] reads a stream as it arrives,
+//! [`RangeReader`] fetches chunks in any order.
 //!
 //! Guaranteed: what was written is read bit for bit (errors of splits, which are estimates, are rounded up); the same bytes for every number of
 //! threads; damage is an error that names the chunk, never a panic, and takes memory in proportion to the bytes that are there. Not guaranteed: that a

@@ -265,7 +265,8 @@ fn cut_off(bytes: &[u8]) {
                 };
                 assert_eq!(index as usize, there, "{end}");
                 let splits = |m: u32| {
-                    let of = |c: &&Chunk| [ChunkType::SPLITS, ChunkType::SEQUEL].contains(&c.kind) && c.mesh == m;
+                    let of =
+                        |c: &&Chunk| [ChunkType::SPLITS, ChunkType::SEQUEL].contains(&c.kind) && c.mesh == m;
                     directory.chunks[..there].iter().filter(of).map(|c| c.count as usize).sum::<usize>()
                 };
                 for (m, pm) in d.meshes.iter().enumerate() {

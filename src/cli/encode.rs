@@ -39,6 +39,9 @@ pub(crate) struct Args {
     /// Leave the order of vertices, faces and corners out, and what makes triangles polygons
     #[arg(long, help_heading = "File")]
     any_order: bool,
+    /// Chunks that can be read alone, in any order, for views that load only what they need: larger by a third
+    #[arg(long, help_heading = "File")]
+    random_access: bool,
     /// Print one JSON object about the run on standard output (see docs/json.md)
     #[arg(long)]
     json: bool,
@@ -84,8 +87,10 @@ impl Args {
             }
             warnings.say(built.warnings.iter().map(|w| format!("{file}: {w}")));
             let encoding = Instant::now();
-            let options =
-                EncodeOptions::default().with_any_order(self.any_order).with_quantize(self.quantize);
+            let options = EncodeOptions::default()
+                .with_any_order(self.any_order)
+                .with_quantize(self.quantize)
+                .with_alone(self.random_access);
             let bytes = encode_progressive(&built.scene, &options)
                 .map_err(|e| Failure::Output(format!("{out}: {e}")))?;
             let encode = encoding.elapsed().as_secs_f64();

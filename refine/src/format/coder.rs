@@ -283,16 +283,8 @@ impl<'a> Decoder<'a> {
     pub(super) fn new(mut stream: &'a [u8]) -> Option<Self> {
         let length = take_varint(&mut stream)?;
         let (bytes, plain) = stream.split_at_checked(usize::try_from(length).ok()?)?;
-        let mut d = Decoder {
-            state: LEAST,
-            bytes,
-            at: 0,
-            window: 0,
-            filled: 0,
-            plain,
-            plain_at: 0,
-            short: false,
-        };
+        let mut d =
+            Decoder { state: LEAST, bytes, at: 0, window: 0, filled: 0, plain, plain_at: 0, short: false };
         if !bytes.is_empty() {
             let high = d.word();
             d.state = (high << 16 | d.word()).max(LEAST);

@@ -91,8 +91,7 @@ impl Extras {
         out: &mut SplitBlock,
     ) -> Option<(usize, usize)> {
         let Some(rows) = &mut self.rows else {
-            return Some((1, 0))
-                .filter(|_| code.kind() == SplitKind::Plain && !code.changes_rows());
+            return Some((1, 0)).filter(|_| code.kind() == SplitKind::Plain && !code.changes_rows());
         };
         let wedge = self.next_wedge;
         let (mut new, mut changed) = (1, code.changes_rows() as usize);

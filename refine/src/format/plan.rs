@@ -17,9 +17,10 @@ const LEAST: usize = 1500;
 const SMALL: usize = 300;
 /// Parts of the mesh whose bands begin at errors of their own, evenly spread, so that at every time some have just been refined and others
 /// are about to be: the mesh never is much coarser in one half than in the other.
-const SEGMENTS: u32 = 4;
-/// Quarters of an octave of error in a band.
-const BAND: u32 = 8;
+const SEGMENTS: u32 = 2;
+/// Quarters of an octave of error in a band: a factor of 2 in distance, of 4 in squared distance, which is what methods count in. With both numbers the first 10, 25
+/// and 50 % of the bytes have at most 1.17 times the rms of the method's own mesh on bunny, horse, igea and dragon; bands twice as wide, up to 1.7.
+const BAND: u32 = 4;
 
 /// Consecutive splits of a plan that make a chunk.
 #[derive(Clone, Copy, Debug)]

@@ -9,19 +9,15 @@ use super::extras::Extras;
 use super::places;
 use super::residual::{Guess, Residuals};
 use super::splits::{
-    CONNECTIVITY, Counts, ERROR_SHIFT, ERRORS, PLACES, STREAMS, Sizes, Source, SplitBlock,
-    error_level,
+    CONNECTIVITY, Counts, ERROR_SHIFT, ERRORS, PLACES, STREAMS, Sizes, Source, SplitBlock, error_level,
 };
 use super::walk::{Cut, NO_LEVEL, Ring, Walk, cut, turn};
 use crate::aif::NONE;
 use crate::progressive::{ProgressiveMesh, SplitCode};
 
 /// Bits of a code that the mesh and the cuts tell.
-const TOLD: u16 = SplitCode::TWO_FACES
-    | SplitCode::MOVES
-    | SplitCode::L_INNER
-    | SplitCode::L_STARTS
-    | SplitCode::R_INNER;
+const TOLD: u16 =
+    SplitCode::TWO_FACES | SplitCode::MOVES | SplitCode::L_INNER | SplitCode::L_STARTS | SplitCode::R_INNER;
 /// Beside the code: the ring runs the other way.
 const TURNED: u32 = 1 << 16;
 /// Beside the code: the cuts are named, not counted.
@@ -292,8 +288,11 @@ impl<'a> Codec<'a> {
         let model = &mut self.m.error[(top.saturating_sub(self.levels[0]) as usize).min(11)];
         let down = top.wrapping_sub(level).min(15) as u32;
         let down = c.nibble(model, down) as u16;
-        let level =
-            if down < 15 { top.checked_sub(down)? } else { c.number(&mut self.m.error_far, level as u64).try_into().ok()? };
+        let level = if down < 15 {
+            top.checked_sub(down)?
+        } else {
+            c.number(&mut self.m.error_far, level as u64).try_into().ok()?
+        };
         Some(level).filter(|&l| l <= 0x3FC)
     }
 
@@ -343,7 +342,8 @@ impl<'a> Codec<'a> {
         if left == NONE {
             return None;
         }
-        code |= if inner { SplitCode::L_INNER } else { 0 } | if left & 1 == 1 { SplitCode::L_STARTS } else { 0 };
+        code |=
+            if inner { SplitCode::L_INNER } else { 0 } | if left & 1 == 1 { SplitCode::L_STARTS } else { 0 };
         if two && cuts.right.name().1 {
             code |= SplitCode::R_INNER;
         }
@@ -354,7 +354,8 @@ impl<'a> Codec<'a> {
     fn find(&self, two: bool, left: u32, right: u32, code: SplitCode) -> Option<(usize, usize)> {
         let faces = self.ring.faces();
         let left = (left >> 2) << 3 | (left & 3) << 1 | code.left_starts() as u32;
-        let first = (0..self.ring.edges()).find(|&k| self.ring.left(k).name() == (left, code.left_inner()))?;
+        let first =
+            (0..self.ring.edges()).find(|&k| self.ring.left(k).name() == (left, code.left_inner()))?;
         if !two {
             return (!self.ring.closed).then_some((first, faces - first));
         }
@@ -382,9 +383,7 @@ impl<'a> Codec<'a> {
         let count = if two {
             let model = &mut self.m.count[class];
             let most = if self.ring.closed { faces - 1 } else { faces - first };
-            rank(c, model, &mut self.m.far, count.wrapping_sub(1))?
-                .checked_add(1)
-                .filter(|&k| k <= most)?
+            rank(c, model, &mut self.m.far, count.wrapping_sub(1))?.checked_add(1).filter(|&k| k <= most)?
         } else {
             (!self.ring.closed).then_some(faces - first)?
         };
@@ -392,13 +391,7 @@ impl<'a> Codec<'a> {
     }
 
     /// Cuts by the numbers of faces: where the vertex has several fans, or the cuts are not named by the later face.
-    fn named<C: Coder>(
-        &mut self,
-        c: &mut C,
-        v: u32,
-        two: bool,
-        source: &Option<Source<'_>>,
-    ) -> Option<Cuts> {
+    fn named<C: Coder>(&mut self, c: &mut C, v: u32, two: bool, source: &Option<Source<'_>>) -> Option<Cuts> {
         let (mut left, mut right, mut code) = (0, 0, SplitCode(0));
         if let Some(s) = source {
             let i = s.at.split;
@@ -408,7 +401,11 @@ impl<'a> Codec<'a> {
         let inner = c.bit(&mut self.m.inner[0], code.left_inner());
         let starts = c.bit(&mut self.m.inner[1], code.left_starts());
         let half = self.walk.named(left, starts, v)?;
-        let begin = if inner { half } else { Some(self.walk.across(half)).filter(|&h| h != NONE).unwrap_or(turn(half)) };
+        let begin = if inner {
+            half
+        } else {
+            Some(self.walk.across(half)).filter(|&h| h != NONE).unwrap_or(turn(half))
+        };
         self.walk.ring(begin, &mut self.ring)?;
         if two {
             right = u32::try_from(c.number(&mut self.m.named[1], right as u64)).ok()?;

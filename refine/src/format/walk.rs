@@ -140,7 +140,8 @@ impl Walk {
         let links = link_faces(&corners, n0);
         let curve = Curve::new(pm);
         let places: Vec<[f64; 3]> = (0..n0).map(|i| places::point(&pm.base_positions, i)).collect();
-        let lone = |&p: &[f64; 3]| Vertex { at: NONE, key: curve.at(p), valence: 0, level: NO_LEVEL, visit: 0 };
+        let lone =
+            |&p: &[f64; 3]| Vertex { at: NONE, key: curve.at(p), valence: 0, level: NO_LEVEL, visit: 0 };
         let mut vertices: Vec<Vertex> = places.iter().map(lone).collect();
         for (f, corners) in (0u32..).zip(&corners) {
             for (k, &v) in (0u32..).zip(corners) {
