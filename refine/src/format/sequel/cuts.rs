@@ -1,0 +1,165 @@
+//! Where a split opens the ring of its vertex.
+
+use super::super::coder::{Coder, Nibble, Number};
+use super::super::splits::Source;
+use super::super::walk::{Cut, cut, turn};
+use super::{Codec, valence_class};
+use crate::aif::NONE;
+use crate::progressive::SplitCode;
+
+/// Bits of a code that the mesh and the cuts tell.
+const TOLD: u16 =
+    SplitCode::TWO_FACES | SplitCode::MOVES | SplitCode::L_INNER | SplitCode::L_STARTS | SplitCode::R_INNER;
+/// Beside the code: the ring runs the other way.
+const TURNED: u32 = 1 << 16;
+/// Beside the code: the cuts are named, not counted.
+const NAMED: u32 = 1 << 17;
+
+/// A split's cuts, as places in the ring.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cuts {
+    pub(super) left: Cut,
+    pub(super) right: Cut,
+    pub(super) first: usize,
+    pub(super) count: usize,
+}
+
+impl Codec<'_> {
+    /// The code of the split and its cuts.
+    pub(super) fn cuts<C: Coder>(
+        &mut self,
+        c: &mut C,
+        (v, state): (u32, u8),
+        two: bool,
+        source: &Option<Source<'_>>,
+    ) -> Option<(SplitCode, Cuts)> {
+        let start = Some(self.walk.start(v)).filter(|&h| h != NONE)?;
+        self.walk.ring(start, &mut self.ring)?;
+        let mut want = None;
+        let (mut rest, mut moves) = (0, false);
+        if let Some(s) = source {
+            let (splits, i) = (&s.pm.splits, s.at.split);
+            let code = splits.code[i];
+            (rest, moves) = ((code.0 & !TOLD) as u32, code.moves());
+            want = self.find(two, splits.left[i], splits.right[i], code);
+            if want.is_none() {
+                self.walk.ring(turn(start), &mut self.ring)?;
+                want = self.find(two, splits.left[i], splits.right[i], code);
+                rest |= if want.is_some() { TURNED } else { NAMED };
+            }
+        }
+        if c.bit(&mut self.m.rest_same, rest == self.rest) {
+            rest = self.rest;
+        } else {
+            rest = u32::try_from(c.number(&mut self.m.rest, rest as u64)).ok()?;
+        }
+        self.rest = rest;
+        let told = if two { SplitCode::TWO_FACES } else { 0 };
+        let mut code = rest as u16 & !TOLD | told;
+        if c.bit(&mut self.m.moves, moves) {
+            code |= SplitCode::MOVES;
+        }
+        let cuts = if rest & NAMED != 0 {
+            self.named(c, v, two, source)?
+        } else {
+            if C::READS && rest & TURNED != 0 {
+                self.walk.ring(turn(start), &mut self.ring)?;
+            }
+            self.counted(c, state, two, want)?
+        };
+        let (left, inner) = cuts.left.name();
+        if left == NONE {
+            return None;
+        }
+        code |=
+            if inner { SplitCode::L_INNER } else { 0 } | if left & 1 == 1 { SplitCode::L_STARTS } else { 0 };
+        if two && cuts.right.name().1 {
+            code |= SplitCode::R_INNER;
+        }
+        Some((SplitCode(code), cuts))
+    }
+
+    /// Where in the ring the writer's cuts are.
+    fn find(&self, two: bool, left: u32, right: u32, code: SplitCode) -> Option<(usize, usize)> {
+        let faces = self.ring.faces();
+        let left = (left >> 2) << 3 | (left & 3) << 1 | code.left_starts() as u32;
+        let first =
+            (0..self.ring.edges()).find(|&k| self.ring.left(k).name() == (left, code.left_inner()))?;
+        if !two {
+            return (!self.ring.closed).then_some((first, faces - first));
+        }
+        let most = if self.ring.closed { faces - 1 } else { faces - first };
+        let count = (1..=most).find(|&k| {
+            let (h, inner) = self.ring.right(first, k).name();
+            cut(h) == right && inner == code.right_inner()
+        })?;
+        Some((first, count))
+    }
+
+    /// Cuts by their rank in the ring.
+    fn counted<C: Coder>(
+        &mut self,
+        c: &mut C,
+        state: u8,
+        two: bool,
+        want: Option<(usize, usize)>,
+    ) -> Option<Cuts> {
+        let (faces, n) = (self.ring.faces(), self.ring.edges());
+        let class = valence_class(n);
+        let (first, count) = want.unwrap_or_default();
+        let model = &mut self.m.rank[state.min(2) as usize][class];
+        let first = rank(c, model, &mut self.m.far, first).filter(|&k| k < n)?;
+        let count = if two {
+            let model = &mut self.m.count[class];
+            let most = if self.ring.closed { faces - 1 } else { faces - first };
+            rank(c, model, &mut self.m.far, count.wrapping_sub(1))?.checked_add(1).filter(|&k| k <= most)?
+        } else {
+            (!self.ring.closed).then_some(faces - first)?
+        };
+        Some(Cuts { left: self.ring.left(first), right: self.ring.right(first, count), first, count })
+    }
+
+    /// Cuts by the numbers of faces: where the vertex has several fans, or the cuts are not named by the later face.
+    fn named<C: Coder>(&mut self, c: &mut C, v: u32, two: bool, source: &Option<Source<'_>>) -> Option<Cuts> {
+        let (mut left, mut right, mut code) = (0, 0, SplitCode(0));
+        if let Some(s) = source {
+            let i = s.at.split;
+            (left, right, code) = (s.pm.splits.left[i], s.pm.splits.right[i], s.pm.splits.code[i]);
+        }
+        let left = u32::try_from(c.number(&mut self.m.named[0], left as u64)).ok()?;
+        let inner = c.bit(&mut self.m.inner[0], code.left_inner());
+        let starts = c.bit(&mut self.m.inner[1], code.left_starts());
+        let half = self.walk.named(left, starts, v)?;
+        let begin = if inner {
+            half
+        } else {
+            Some(self.walk.across(half)).filter(|&h| h != NONE).unwrap_or(turn(half))
+        };
+        self.walk.ring(begin, &mut self.ring)?;
+        if two {
+            right = u32::try_from(c.number(&mut self.m.named[1], right as u64)).ok()?;
+            if c.bit(&mut self.m.inner[2], code.right_inner()) {
+                code.0 |= SplitCode::R_INNER;
+            } else {
+                code.0 &= !SplitCode::R_INNER;
+            }
+        }
+        let flags = |on: bool, flag: u16| if on { flag } else { 0 };
+        let code = SplitCode(
+            code.0 & SplitCode::R_INNER
+                | flags(inner, SplitCode::L_INNER)
+                | flags(starts, SplitCode::L_STARTS),
+        );
+        let (first, count) = self.find(two, left, right, code)?;
+        Some(Cuts { left: self.ring.left(first), right: self.ring.right(first, count), first, count })
+    }
+}
+
+/// A rank: below 15 as a symbol.
+#[inline]
+fn rank<C: Coder>(c: &mut C, m: &mut Nibble, far: &mut Number, value: usize) -> Option<usize> {
+    match c.nibble(m, value.min(15) as u32) {
+        15 => usize::try_from(c.number(far, (value as u64).wrapping_sub(15))).ok()?.checked_add(15),
+        near => Some(near as usize),
+    }
+}

@@ -1,0 +1,121 @@
+//! Which vertex is split next: sweeps over the chunk's vertices, in which each is asked whether its turn has come.
+
+use super::super::coder::Coder;
+use super::super::splits::{CONNECTIVITY, ERRORS, STREAMS};
+use super::{Codec, valence_class};
+
+/// What a vertex did when the sweep last came by.
+const ROOT: u8 = 0;
+pub(super) const NEW: u8 = 1;
+const SPLIT: u8 = 2;
+/// It waits for others; so often it was asked again.
+const WAITED: u8 = 3;
+const MOST: u8 = 6;
+const DONE: u8 = 7;
+/// Beside these: its ring has grown since.
+pub(super) const TOUCHED: u8 = 8;
+
+impl Codec<'_> {
+    /// Codes the chunk's roots; a writer gives its splits.
+    pub(super) fn begin<C: Coder>(
+        &mut self,
+        c: &mut [C; STREAMS],
+        of: &[u32],
+        levels: [u16; 2],
+        count: usize,
+    ) -> Option<()> {
+        self.levels[0] = c[ERRORS].plain(16, levels[0] as u32) as u16;
+        self.levels[1] = c[ERRORS].plain(16, levels[1] as u32) as u16;
+        let c = &mut c[CONNECTIVITY];
+        let first = self.first_vertex as u32;
+        let mut roots: Vec<u32> = of.iter().copied().filter(|&v| v < first).collect();
+        roots.sort_unstable();
+        roots.dedup();
+        let number = c.number(&mut self.m.roots, roots.len() as u64);
+        if number > count as u64 {
+            return None;
+        }
+        let mut next = 0u64;
+        for k in 0..number as usize {
+            let gap = c.number(&mut self.m.root, roots.get(k).map_or(0, |&r| r as u64 - next));
+            let v = u32::try_from(next.checked_add(gap)?).ok().filter(|&v| v < first)?;
+            next = v as u64 + 1;
+            self.walk.vertices[v as usize].visit = ROOT;
+            self.pass.push(v);
+            if c.spent() {
+                return None;
+            }
+        }
+        // Along the curve, so that what is near is near in memory too; the first on top.
+        let vertices = &self.walk.vertices;
+        self.pass.sort_unstable_by_key(|&v| std::cmp::Reverse((vertices[v as usize].key, v)));
+        if !C::READS {
+            self.to_come = vec![0; of.len() + roots.len()];
+            self.roots = roots;
+            for &v in of {
+                *self.left(v)? += 1;
+            }
+        }
+        Some(())
+    }
+
+    /// The splits of a vertex to come (writer).
+    pub(super) fn left(&mut self, v: u32) -> Option<&mut u16> {
+        let at = match (v as usize).checked_sub(self.first_vertex) {
+            Some(new) => self.roots.len() + new,
+            None => self.roots.binary_search(&v).ok()?,
+        };
+        self.to_come.get_mut(at)
+    }
+
+    /// The vertex of the next split, by the sweep, and what it did last.
+    pub(super) fn sweep<C: Coder>(&mut self, c: &mut C, wanted: u32) -> Option<(u32, u8)> {
+        loop {
+            let Some(v) = self.pass.pop() else {
+                if self.list.is_empty() || !self.moved {
+                    return None;
+                }
+                self.moved = false;
+                std::mem::swap(&mut self.pass, &mut self.list);
+                self.pass.reverse();
+                continue;
+            };
+            let vertex = &mut self.walk.vertices[v as usize];
+            let (state, touched) = (vertex.visit & 7, vertex.visit & TOUCHED != 0);
+            if state >= WAITED && !touched {
+                // What it waits for would have touched it.
+                self.list.push(v);
+                continue;
+            }
+            let level = vertex.level.min(self.levels[1]).saturating_sub(self.levels[0]);
+            let level = match level {
+                0 => 0,
+                1 | 2 => 1,
+                3 | 4 => 2,
+                5 | 6 => 3,
+                7 | 8 => 4,
+                _ => 5,
+            };
+            let class = valence_class(vertex.valence as usize);
+            if c.bit(&mut self.m.split[state.min(4) as usize][class][level], v == wanted) {
+                vertex.visit = SPLIT;
+                self.moved = true;
+                if !C::READS {
+                    *self.left(v)? -= 1;
+                }
+                return Some((v, state));
+            }
+            let more = if C::READS { 0 } else { *self.left(v)? };
+            let vertex = &mut self.walk.vertices[v as usize];
+            if state >= WAITED || !c.bit(&mut self.m.done[state as usize][level], more == 0) {
+                vertex.visit = if state < WAITED { WAITED } else { (state + 1).min(MOST) };
+                self.list.push(v);
+            } else {
+                vertex.visit = DONE;
+            }
+            if c.spent() {
+                return None;
+            }
+        }
+    }
+}
