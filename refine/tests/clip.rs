@@ -543,6 +543,10 @@ fn an_open_mesh_has_no_cap_where_it_is_open() {
         input.corners.chunks(4).enumerate().filter(|(f, _)| *f != 1).flat_map(|(_, c)| c.to_vec()).collect();
     let done = clip_mesh(&input, &[DVec4::Z], true).unwrap();
     assert_eq!((done.loops, done.capped, done.open_edges), (0, 0, 3));
+    // A box that leaves the open side out closes, though its first plane runs into the hole.
+    let planes = [DVec4::Z, DVec4::new(-1.0, 0.0, 0.0, 0.5)];
+    let done = clip_mesh(&input, &planes, true).unwrap();
+    assert_eq!((done.loops, done.open_edges, border(&done.mesh)), (2, 0, 0));
     // Cut away from it, it closes.
     let done = clip_mesh(&input, &[DVec4::new(-1.0, 0.0, 0.0, 0.5)], true).unwrap();
     assert_eq!((done.loops, border(&done.mesh)), (1, 0));
@@ -581,6 +585,24 @@ fn hostile_meshes_are_cut_without_harm() {
     let mut bad = cube();
     bad.corners[3] = 99;
     assert!(matches!(clip_mesh(&bad, &[DVec4::X], false), Err(MeshClipError::Mesh(_))));
+}
+
+#[test]
+fn cuts_that_round_to_one_place_are_one_vertex() {
+    // A pyramid whose tip is cut where f32 has no room between the edges; and just above and below the tip.
+    let points =
+        vec![[-1.0f32, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [0.3, 0.2, 1.0]];
+    let faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 2, 1], [0, 3, 2]];
+    let input = MeshInput::triangles(points, &faces);
+    for height in [1.0 - 1e-9, 1.0, 1.0 - 3e-8, 1.0 - 1e-7, 1.0 - 3e-7] {
+        for way in [1.0, -1.0] {
+            let done = clip_mesh(&input, &[DVec4::new(0.0, 0.0, way, -way * height)], true).unwrap();
+            assert_eq!((border(&done.mesh), done.open_edges), (0, 0));
+            let places: std::collections::HashSet<_> =
+                (0..done.mesh.positions.len()).map(|v| done.mesh.positions.bits(v)).collect();
+            assert_eq!(places.len(), done.mesh.positions.len(), "{height} {way}");
+        }
+    }
 }
 
 #[test]

@@ -51,14 +51,15 @@ pub enum MeshClipError {
 ///
 /// Faces keep their order, orientation, material and group; of a mesh of triangles alone, what is left is triangles, of another, polygons, and a face
 /// that is not convex may become several. New vertices lie on the cut edges
-/// (once an edge, for all its faces) and are rounded to the mesh's precision; planes square to an axis are met exactly. Attributes are interpolated,
+/// (once an edge, for all its faces) and are rounded to the mesh's precision, in which planes square to an axis are met exactly; a vertex that a cut
+/// rounds to counts as on the plane. Attributes are interpolated,
 /// normals and tangents of unit length; joint indices are taken from the end nearer by. Edges without a face are cut too; vertices of
 /// nothing stay if they are inside.
 ///
 /// Faces that lie in a plane stay. With `cap`, where the mesh is the surface of a solid, those stay only that turn their back to the plane, and the cut is closed
 /// with triangles between its loops, holes left open: a closed mesh stays closed, every cut edge with two faces. Caps take material and group of
 /// the faces along them, attributes of their corners, and the plane's normal. Where the mesh is open at the cut there is no loop to close
-/// ([`MeshClip::open_edges`]). If it intersects itself there, caps may overlap; they still close it.
+/// ([`MeshClip::open_edges`]); planes are then taken in the order that leaves the fewest such edges, first come first. If it intersects itself there, caps may overlap; they still close it.
 ///
 /// Deterministic. O(planes * faces) and, for caps of n corners, O(n log n) to O(n^2).
 pub fn clip_mesh(input: &MeshInput, planes: &[DVec4], cap: bool) -> Result<MeshClip, MeshClipError> {
@@ -67,14 +68,34 @@ pub fn clip_mesh(input: &MeshInput, planes: &[DVec4], cap: bool) -> Result<MeshC
         return Err(MeshClipError::Plane(k));
     }
     let mut work = Work::new(input);
-    for &plane in planes {
-        work.cut_by(plane, cap)?;
+    let mut left = planes.to_vec();
+    while !left.is_empty() {
+        if !cap || left.len() == 1 {
+            work.cut_by(left.remove(0), cap)?;
+            continue;
+        }
+        // Where the mesh has holes, one plane may cut them off before another runs into them.
+        let mut best: Option<(usize, Work<'_>)> = None;
+        for (k, &plane) in left.iter().enumerate() {
+            let mut trial = work.clone();
+            trial.cut_by(plane, true)?;
+            let good = trial.done.open_edges == work.done.open_edges;
+            if good || best.as_ref().is_none_or(|b| trial.done.open_edges < b.1.done.open_edges) {
+                best = Some((k, trial));
+            }
+            if good {
+                break;
+            }
+        }
+        let Some((k, after)) = best else { break };
+        work = after;
+        left.remove(k);
     }
     work.finish(input)
 }
 
 /// Faces of a mesh on their way through the planes: flat, in order.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Faces {
     pub(super) sizes: Vec<u32>,
     pub(super) corners: Vec<u32>,
@@ -114,6 +135,7 @@ impl Faces {
     }
 }
 
+#[derive(Clone)]
 struct Work<'a> {
     points: Vec<DVec3>,
     single: bool,
@@ -128,6 +150,8 @@ struct Work<'a> {
     sides: Vec<f64>,
     /// Edge -> vertex where the plane cuts it.
     crossings: FxHashMap<[u32; 2], u32>,
+    /// (End of a cut edge, place of the cut) -> vertex there: cuts around a vertex that round to one place are one.
+    near: FxHashMap<(u32, [u64; 3]), u32>,
     /// (Vertex there, wedges of the ends) -> wedge there.
     mixed: FxHashMap<[u32; 3], u32>,
     done: MeshClip,
@@ -156,6 +180,7 @@ impl<'a> Work<'a> {
             lonely: (0..n as u32).filter(|&v| !used[v as usize]).collect(),
             sides: vec![],
             crossings: FxHashMap::default(),
+            near: FxHashMap::default(),
             mixed: FxHashMap::default(),
             done: MeshClip::default(),
         }
@@ -168,9 +193,11 @@ impl<'a> Work<'a> {
             return Ok(());
         }
         self.crossings.clear();
+        self.near.clear();
         self.mixed.clear();
         self.next.clear();
         let faces = std::mem::take(&mut self.faces);
+        self.snap(&faces, plane);
         let (mut start, mut pieces) = (0, Pieces::default());
         for f in 0..faces.sizes.len() {
             let slots = start..start + faces.sizes[f] as usize;
@@ -214,12 +241,8 @@ impl<'a> Work<'a> {
         (1..corners.len() - 1).map(|i| at(i).cross(at(i + 1))).sum()
     }
 
-    /// The vertex where the plane cuts an edge.
-    fn crossing(&mut self, a: u32, b: u32, plane: DVec4) -> Result<u32, MeshClipError> {
-        let key = [a.min(b), a.max(b)];
-        if let Some(&v) = self.crossings.get(&key) {
-            return Ok(v);
-        }
+    /// Where the plane cuts an edge, in the mesh's precision.
+    fn place(&self, a: u32, b: u32, plane: DVec4) -> DVec3 {
         let at = |v: u32| (self.points[v as usize], self.sides[v as usize]);
         let ((p, sp), (q, sq)) = (at(a), at(b));
         let (from, to, t) = fraction(p, sp, q, sq);
@@ -230,14 +253,50 @@ impl<'a> Work<'a> {
                 place[k] = -plane.w / plane[k];
             }
         }
-        if self.single {
-            place = place.as_vec3().as_dvec3();
+        if self.single { place.as_vec3().as_dvec3() } else { place }
+    }
+
+    /// Puts vertices on the plane that a cut beside them would round to.
+    fn snap(&mut self, faces: &Faces, plane: DVec4) {
+        let mut start = 0;
+        for &n in &faces.sizes {
+            let (from, to) = (start, start + n);
+            start = to;
+            for c in from..to {
+                let (a, b) = (faces.corners[c as usize], faces.corners[next(c, from, to) as usize]);
+                let (sa, sb) = (self.sides[a as usize], self.sides[b as usize]);
+                if sa.min(sb) < 0.0 && sa.max(sb) > 0.0 {
+                    let place = self.place(a, b, plane);
+                    for v in [a, b] {
+                        if self.points[v as usize] == place {
+                            self.sides[v as usize] = 0.0;
+                        }
+                    }
+                }
+            }
         }
-        if self.points.len() >= NONE as usize - 1 {
-            return Err(MeshClipError::TooLarge);
+    }
+
+    /// The vertex where the plane cuts an edge.
+    fn crossing(&mut self, a: u32, b: u32, plane: DVec4) -> Result<u32, MeshClipError> {
+        let key = [a.min(b), a.max(b)];
+        if let Some(&v) = self.crossings.get(&key) {
+            return Ok(v);
         }
-        let v = self.points.len() as u32;
-        self.points.push(place);
+        let place = self.place(a, b, plane);
+        // -0 and 0 are one place.
+        let bits = (place + 0.0).to_array().map(f64::to_bits);
+        let v = match [a, b].iter().find_map(|&end| self.near.get(&(end, bits))) {
+            Some(&v) => v,
+            None if self.points.len() >= NONE as usize - 1 => return Err(MeshClipError::TooLarge),
+            None => {
+                self.points.push(place);
+                self.points.len() as u32 - 1
+            }
+        };
+        for end in [a, b] {
+            self.near.entry((end, bits)).or_insert(v);
+        }
         self.crossings.insert(key, v);
         Ok(v)
     }
@@ -298,22 +357,21 @@ impl<'a> Work<'a> {
                     })
                 };
                 let start = node(self, chain.start)?;
-                if pieces.cycle.last() != Some(&start) {
-                    pieces.cycle.push(start);
-                }
+                pieces.put(start);
                 let mut i = chain.first;
                 loop {
-                    pieces.cycle.push((corners[i as usize], wedge(i)));
+                    pieces.put((corners[i as usize], wedge(i)));
                     if i == chain.last {
                         break;
                     }
                     i = next(i, 0, n);
                 }
-                pieces.cycle.push(node(self, chain.end)?);
+                pieces.put(node(self, chain.end)?);
                 c = following[c] as usize;
             }
             // The boundary may end where it began.
-            while pieces.cycle.len() > 1 && pieces.cycle.first() == pieces.cycle.last() {
+            let vertex = |c: Option<&(u32, u32)>| c.map(|c| c.0);
+            while pieces.cycle.len() > 1 && vertex(pieces.cycle.first()) == vertex(pieces.cycle.last()) {
                 pieces.cycle.pop();
             }
             if pieces.cycle.len() >= 3 {
@@ -459,6 +517,15 @@ struct Pieces {
     chains: Vec<Chain>,
     done: Vec<bool>,
     cycle: Vec<(u32, u32)>,
+}
+
+impl Pieces {
+    /// A corner of the cycle, unless it is at the vertex before it: cuts may have rounded to one.
+    fn put(&mut self, corner: (u32, u32)) {
+        if self.cycle.last().is_none_or(|last| last.0 != corner.0) {
+            self.cycle.push(corner);
+        }
+    }
 }
 
 /// The faces of a mesh that `keep` names (ascending), with what they use; edges without a face stay, vertices of nothing too.
