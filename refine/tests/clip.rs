@@ -275,7 +275,7 @@ fn of_cells(cells: &[bool]) -> Polygon {
     starts.sort_unstable();
     let mut cycles = vec![];
     for start in starts {
-        while edges[&start].first().is_some() {
+        while !edges[&start].is_empty() {
             let (mut at, mut cycle, mut came) = (start, vec![], (0, 0));
             loop {
                 let ways = edges.get_mut(&at).unwrap();

@@ -67,10 +67,10 @@ fn of(p: DVec3) -> [Expansion; 3] {
 
 fn exact_det(a: &[Expansion; 3], b: &[Expansion; 3], c: &[Expansion; 3]) -> Expansion {
     let mut sum = Expansion::default();
-    for k in 0..3 {
+    for (k, a) in a.iter().enumerate() {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
         let minor = b[i].times(&c[j]).minus(&b[j].times(&c[i]));
-        sum = sum.plus(&a[k].times(&minor));
+        sum = sum.plus(&a.times(&minor));
     }
     sum
 }
@@ -253,10 +253,10 @@ mod tests {
         for i in 0..32 {
             for j in 0..32 {
                 let a = DVec2::new(0.5 + i as f64 * f64::EPSILON / 2.0, 0.5 + j as f64 * f64::EPSILON / 2.0);
-                let want = (j as i32 - i as i32).signum();
-                assert_eq!(orient(a, b, c).partial_cmp(&0.0).unwrap() as i32, want, "{i} {j}");
+                let want: i32 = j - i;
+                assert_eq!(orient(a, b, c).partial_cmp(&0.0).unwrap() as i32, want.signum(), "{i} {j}");
                 let d = det3(a.extend(1.0), b.extend(1.0), c.extend(1.0));
-                assert_eq!(d.partial_cmp(&0.0).unwrap() as i32, want, "{i} {j}");
+                assert_eq!(d.partial_cmp(&0.0).unwrap() as i32, want.signum(), "{i} {j}");
             }
         }
     }
