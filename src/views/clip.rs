@@ -74,7 +74,7 @@ pub fn clip_scene(scene: &mut Scene, planes: &[DVec4], cap: bool) -> Result<Clip
             return Ok(Fate::Drop);
         }
         report.cut += 1;
-        Ok(Fate::Replace(done.mesh))
+        Ok(Fate::Replace(Box::new(done.mesh)))
     })?;
     Ok(report)
 }

@@ -76,7 +76,7 @@ pub fn cull_scene(scene: &mut Scene, camera: &Camera) -> Result<CullReport, View
             return Ok(Fate::Drop);
         }
         let left = gather_faces(&mesh.geometry, &keep);
-        left.map(Fate::Replace).map_err(|source| ViewError::Mesh { mesh: m, source })
+        left.map(|m| Fate::Replace(Box::new(m))).map_err(|source| ViewError::Mesh { mesh: m, source })
     })?;
     Ok(report)
 }

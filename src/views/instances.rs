@@ -12,7 +12,7 @@ pub(super) enum Fate {
     /// It shows nothing.
     Drop,
     /// It shows this instead.
-    Replace(MeshInput),
+    Replace(Box<MeshInput>),
 }
 
 /// Asks for the fate of every instance, and changes the scene accordingly. Instances of one mesh at the same place share one answer.
@@ -29,7 +29,7 @@ pub(super) fn each<E>(
                 Fate::Keep => kept.push(std::mem::take(&mut scene.meshes[m])),
                 Fate::Drop => {}
                 Fate::Replace(geometry) => {
-                    kept.push(SceneMesh { geometry, ..std::mem::take(&mut scene.meshes[m]) });
+                    kept.push(SceneMesh { geometry: *geometry, ..std::mem::take(&mut scene.meshes[m]) });
                 }
             }
         }
@@ -69,13 +69,14 @@ pub(super) fn each<E>(
             Some(Fate::Keep) => Some(*m),
             Some(Fate::Replace(geometry)) => Some(if std::mem::replace(&mut taken[*m], true) {
                 let old = &scene.meshes[*m];
-                scene.meshes.push(SceneMesh { name: old.name.clone(), groups: old.groups.clone(), geometry });
+                let (name, groups) = (old.name.clone(), old.groups.clone());
+                scene.meshes.push(SceneMesh { name, groups, geometry: *geometry });
                 if let Some(source) = &mut scene.gltf {
                     source.copy_mesh(*m);
                 }
                 scene.meshes.len() - 1
             } else {
-                scene.meshes[*m].geometry = geometry;
+                scene.meshes[*m].geometry = *geometry;
                 *m
             }),
             Some(Fate::Drop) | None => None,

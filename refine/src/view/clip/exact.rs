@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn signs_are_exact_where_rounding_is_not() {
-        // 0.1 + 0.2 - 0.3 is not 0 in f64, and neither are these exactly representable numbers' sum.
+        // What f64 holds for 0.1, 0.2 and 0.3.
         let plane = DVec4::new(0.1, 0.2, -0.3, 0.0);
         assert!(side(plane, DVec4::ONE) > 0.0);
         let big = DVec4::new(1e16, 1.0, -1e16, 0.0);
