@@ -21,6 +21,7 @@ pub mod report;
 pub mod samples;
 pub mod scene;
 pub mod views;
+pub mod selective;
 
 /// The README's example must compile.
 #[cfg(all(doctest, feature = "files"))]

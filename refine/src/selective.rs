@@ -18,11 +18,13 @@ mod lens;
 mod list;
 mod morph;
 mod output;
+mod regulator;
 
 pub use adapt::{Done, Limits};
 pub use changes::Changes;
 pub(crate) use front::Front;
 pub use lens::{Cull, Lens, LensError};
+pub use regulator::Regulator;
 
 use crate::aif::NONE;
 use crate::hierarchy::Hierarchy;

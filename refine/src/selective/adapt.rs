@@ -1,5 +1,6 @@
 //! From the mesh of the last frame to that of this one.
 
+use super::list::Entry;
 use super::{Lens, View};
 use crate::aif::NONE;
 
@@ -86,6 +87,11 @@ impl View {
     ///
     /// O(vertices shown) looks, and O(valence) for every split applied or undone. A frame that a limit cut short is taken up by the next.
     pub fn adapt(&mut self, lens: &Lens, limits: &Limits<'_>) -> Done {
+        self.adapt_to_all(std::slice::from_ref(lens), limits)
+    }
+
+    /// As [`View::adapt`], to several lenses: what any of them needs is needed. For a mesh that stands in several places. Without lenses nothing is needed.
+    pub fn adapt_to_all(&mut self, lenses: &[Lens], limits: &Limits<'_>) -> Done {
         let mut meter = Meter {
             limits: *limits,
             done: Done::default(),
@@ -94,17 +100,18 @@ impl View {
             over: false,
             whole: true,
         };
-        self.coarsen(lens, &mut meter);
+        self.coarsen(lenses, &mut meter);
         if !meter.over {
-            self.refine(lens, &mut meter);
+            self.refine(lenses, &mut meter);
         }
         meter.done.complete = !meter.over && meter.whole && meter.done.refused == 0;
         meter.done
     }
 
     /// Undoes splits that are not needed, until none is left that could be.
-    fn coarsen(&mut self, lens: &Lens, meter: &mut Meter<'_>) {
-        let keep = lens.tau() * meter.limits.hysteresis.clamp(1e-6, 1.0);
+    fn coarsen(&mut self, lenses: &[Lens], meter: &mut Meter<'_>) {
+        let keep = meter.limits.hysteresis.clamp(1e-6, 1.0);
+        let wants = |e: &Entry| lenses.iter().any(|l| l.wants(e, keep * l.tau()));
         // Downwards: what comes in is put at the end, and looked at as it does.
         let (mut at, whole) = start(self.resume[0], self.last.entries.len());
         let mut stack = Vec::new();
@@ -112,7 +119,7 @@ impl View {
             at = (at - 1).min(self.last.entries.len().saturating_sub(1));
             meter.looks += 1;
             let Some(e) = self.last.entries.get(at) else { break };
-            if lens.wants(e, keep) {
+            if wants(e) {
                 continue;
             }
             stack.push(e.split);
@@ -121,7 +128,7 @@ impl View {
                 // It may have come in twice.
                 let Some(e) = self.last.entries.get(place).filter(|e| e.split == i) else { continue };
                 meter.looks += 1;
-                if lens.wants(e, keep) {
+                if wants(e) {
                     continue;
                 }
                 if !meter.goes_on() {
@@ -139,7 +146,9 @@ impl View {
     }
 
     /// Applies splits that are needed, until none is left.
-    fn refine(&mut self, lens: &Lens, meter: &mut Meter<'_>) {
+    fn refine(&mut self, lenses: &[Lens], meter: &mut Meter<'_>) {
+        let wants = |e: &Entry| lenses.iter().any(|l| l.wants(e, l.tau()));
+        let urgency = |e: &Entry| lenses.iter().map(|l| l.urgency(e)).fold(0.0, f64::max);
         let bucket = |u: f64| ((u.max(1.0).log2() * 8.0) as usize).min(BUCKETS - 1);
         let mut buckets: Vec<Vec<u32>> = vec![Vec::new(); BUCKETS];
         let mut highest = 0;
@@ -148,12 +157,12 @@ impl View {
         let sorted = meter.limits.faces < usize::MAX
             || meter.limits.operations < usize::MAX
             || meter.limits.expired.is_some();
-        let rank = |e: &super::list::Entry| if sorted { bucket(lens.urgency(e)) } else { 0 };
+        let rank = |e: &Entry| if sorted { bucket(urgency(e)) } else { 0 };
         while at > 0 && meter.goes_on() {
             at -= 1;
             meter.looks += 1;
             let Some(e) = self.open.entries.get(at) else { break };
-            if lens.wants(e, lens.tau()) {
+            if wants(e) {
                 let b = rank(e);
                 highest = highest.max(b);
                 buckets[b].push(e.split);
@@ -195,7 +204,7 @@ impl View {
                         continue;
                     }
                     let Some(e) = self.open.entries.get(self.place[next as usize] as usize) else { continue };
-                    if e.split == next && lens.wants(e, lens.tau()) {
+                    if e.split == next && wants(e) {
                         let b = rank(e);
                         highest = highest.max(b);
                         buckets[b].push(next);

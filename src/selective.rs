@@ -1,0 +1,249 @@
+//! A scene whose meshes are refined where a camera needs it.
+
+mod flight;
+mod judge;
+
+pub use flight::{FlightPath, PathError, circle, lemniscate, recorded};
+pub use judge::{Judge, Judgement};
+
+use crate::progressive::{Leftover, ProgressiveScene};
+use crate::refine::hierarchy::{Hierarchy, Options};
+use crate::refine::progressive::Damage;
+use crate::refine::selective::{Changes, Cull, Done, Lens, LensError, Limits, View};
+use crate::refine::view::Camera;
+use crate::scene::Scene;
+use glam::{DMat4, DVec3};
+use std::sync::Arc;
+
+/// A scene with a [`View`] of each mesh. A mesh that stands in several places is as fine as the most demanding of them asks.
+#[derive(Clone, Debug)]
+pub struct SelectiveScene {
+    shell: Scene,
+    leftovers: Vec<Leftover>,
+    views: Vec<View>,
+    /// For each mesh where it stands.
+    places: Vec<Vec<DMat4>>,
+}
+
+/// A mesh of a scene cannot be refined selectively.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SelectiveError {
+    /// Its splits are damaged.
+    #[error("mesh {mesh}: {source}")]
+    Damage {
+        /// Its number.
+        mesh: usize,
+        /// What is wrong.
+        source: Damage,
+    },
+    /// The view cannot be had of it.
+    #[error("mesh {mesh}: {source}")]
+    Lens {
+        /// Its number.
+        mesh: usize,
+        /// What is wrong.
+        source: LensError,
+    },
+}
+
+/// Halvings of the interval of tolerances in [`SelectiveScene::extract`]: to a millionth.
+const HALVINGS: u32 = 24;
+
+impl SelectiveScene {
+    /// Builds the hierarchies; every mesh shows its base. About 20 microseconds a vertex.
+    ///
+    /// Errors: a damaged mesh.
+    pub fn new(scene: ProgressiveScene, options: &Options) -> Result<SelectiveScene, SelectiveError> {
+        let mut places = vec![Vec::new(); scene.meshes.len()];
+        let shown = scene.shell.instance_counts();
+        for (node, world) in scene.shell.nodes.iter().zip(scene.shell.world_transforms()) {
+            if let Some(m) = node.mesh.filter(|&m| shown.get(m).is_some_and(|&n| n > 0)) {
+                places[m].push(world);
+            }
+        }
+        if scene.shell.nodes.is_empty() {
+            places.iter_mut().for_each(|p| p.push(DMat4::IDENTITY));
+        }
+        let each = scene.meshes.into_iter().enumerate().map(|(mesh, pm)| {
+            let h = Hierarchy::new(Arc::new(pm), options);
+            h.map(|h| View::new(Arc::new(h))).map_err(|source| SelectiveError::Damage { mesh, source })
+        });
+        let views = each.collect::<Result<_, _>>()?;
+        Ok(SelectiveScene { views, places, shell: scene.shell, leftovers: scene.leftovers })
+    }
+
+    /// The views, one a mesh.
+    pub fn views(&self) -> &[View] {
+        &self.views
+    }
+
+    /// Faces shown, of all meshes, each counted once.
+    pub fn face_count(&self) -> usize {
+        self.views.iter().map(View::face_count).sum()
+    }
+
+    /// Vertices shown.
+    pub fn vertex_count(&self) -> usize {
+        self.views.iter().map(View::vertex_count).sum()
+    }
+
+    /// Faces at full detail.
+    pub fn full_faces(&self) -> usize {
+        self.views.iter().map(|v| v.hierarchy().mesh().faces()).sum()
+    }
+
+    /// Vertices at full detail.
+    pub fn full_vertices(&self) -> usize {
+        self.views.iter().map(|v| v.hierarchy().mesh().vertices()).sum()
+    }
+
+    /// Least and greatest coordinates in the world of spheres about the meshes' places; `None` if nothing is shown.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let mut all: Option<(DVec3, DVec3)> = None;
+        for (view, places) in self.views.iter().zip(&self.places) {
+            let pm = view.hierarchy().mesh();
+            let own = [&pm.base_positions, &pm.new_positions];
+            let own = own.into_iter().filter_map(|p| p.bounds());
+            let Some((lo, hi)) = own.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else { continue };
+            for m in places {
+                for k in 0..8u32 {
+                    let pick = |axis: usize| if k >> axis & 1 == 1 { hi[axis] } else { lo[axis] };
+                    let p = m.transform_point3(DVec3::new(pick(0), pick(1), pick(2)));
+                    all = Some(all.map_or((p, p), |(lo, hi)| (lo.min(p), hi.max(p))));
+                }
+            }
+        }
+        all
+    }
+
+    /// Adapts all meshes to a camera. The limit of faces is for all of them; the others are for each.
+    ///
+    /// Errors: a tolerance that is none; a mesh placed by a matrix that flattens it.
+    pub fn adapt(
+        &mut self,
+        camera: &Camera,
+        tau: f64,
+        cull: Cull,
+        limits: &Limits<'_>,
+    ) -> Result<Done, SelectiveError> {
+        let mut all = Done { complete: true, ..Done::default() };
+        let lenses = self.lenses(camera, tau, cull)?;
+        for (m, lenses) in lenses.iter().enumerate() {
+            let others = self.face_count() - self.views[m].face_count();
+            let limits = Limits { faces: limits.faces.saturating_sub(others), ..*limits };
+            let done = self.views[m].adapt_to_all(lenses, &limits);
+            all.splits += done.splits;
+            all.collapses += done.collapses;
+            all.forced += done.forced;
+            all.refused += done.refused;
+            all.complete &= done.complete;
+        }
+        Ok(all)
+    }
+
+    /// For each mesh the lenses of its places.
+    ///
+    /// Errors: as [`SelectiveScene::adapt`].
+    pub fn lenses(&self, camera: &Camera, tau: f64, cull: Cull) -> Result<Vec<Vec<Lens>>, SelectiveError> {
+        let of = |m: usize| {
+            let h = self.views[m].hierarchy();
+            let each = self.places[m].iter().map(|p| Lens::new(h, camera, p, tau, cull));
+            each.collect::<Result<Vec<_>, _>>().map_err(|source| SelectiveError::Lens { mesh: m, source })
+        };
+        (0..self.views.len()).map(of).collect()
+    }
+
+    /// Adapts to a camera without limits of time, at `tau`, or at the least tolerance above it with which at most `faces` faces are shown. Returns that tolerance; it is infinite
+    /// if the bases have more.
+    ///
+    /// Errors: as [`SelectiveScene::adapt`].
+    pub fn extract(
+        &mut self,
+        camera: &Camera,
+        tau: f64,
+        cull: Cull,
+        faces: Option<usize>,
+    ) -> Result<f64, SelectiveError> {
+        let most = faces.unwrap_or(usize::MAX);
+        let no_limits = Limits::default();
+        self.adapt(camera, tau, cull, &no_limits)?;
+        if self.face_count() <= most {
+            return Ok(tau);
+        }
+        let (mut low, mut high) = (tau, tau.max(1e-3));
+        loop {
+            high *= 2.0;
+            self.adapt(camera, high, cull, &no_limits)?;
+            if self.face_count() <= most || high.is_infinite() {
+                break;
+            }
+            low = high;
+        }
+        for _ in 0..if high.is_finite() { HALVINGS } else { 0 } {
+            let middle = 0.5 * (low + high);
+            self.adapt(camera, middle, cull, &no_limits)?;
+            *if self.face_count() <= most { &mut high } else { &mut low } = middle;
+        }
+        self.adapt(camera, high, cull, &no_limits)?;
+        Ok(high)
+    }
+
+    /// What changed in the buffers of each mesh since this was last called.
+    pub fn take_changes(&mut self) -> Vec<Changes> {
+        self.views.iter_mut().map(View::take_changes).collect()
+    }
+
+    /// The scene as it is shown. At full detail it is the scene that was made progressive, bit for bit. O(n).
+    pub fn to_scene(&self) -> Scene {
+        let mut scene = self.shell.clone();
+        scene.meshes.resize_with(self.views.len(), Default::default);
+        let whole = |v: &View| v.vertex_count() == v.hierarchy().mesh().vertices();
+        let all = self.views.iter().all(whole);
+        for (i, view) in self.views.iter().enumerate() {
+            let geometry = view.to_input();
+            let ordered = view.hierarchy().mesh().order.is_some();
+            scene.meshes[i].geometry = match self.leftovers.get(i).filter(|_| all && ordered) {
+                Some(left) => left.put_back(geometry),
+                None => geometry,
+            };
+        }
+        scene
+    }
+
+    /// The triangles shown, in the world: three corners each.
+    pub fn triangles(&self) -> Vec<[DVec3; 3]> {
+        let mut out = Vec::new();
+        for (view, places) in self.views.iter().zip(&self.places) {
+            let slots = (0..view.indices().len()).filter(|&s| view.face_in(s).is_some());
+            let own: Vec<[DVec3; 3]> = slots
+                .map(|s| view.indices()[s].map(|w| view.position(view.wedge_vertex(w)).unwrap_or_default()))
+                .collect();
+            for m in places {
+                out.extend(own.iter().map(|t| t.map(|p| m.transform_point3(p))));
+            }
+        }
+        out
+    }
+
+    /// Vertices that a camera's frustum holds, of those shown, places counted each.
+    pub fn visible_vertices(&self, camera: &Camera) -> usize {
+        let frustum = camera.frustum();
+        let mut count = 0;
+        for (view, places) in self.views.iter().zip(&self.places) {
+            let all = 0..view.hierarchy().mesh().vertices() as u32;
+            for p in all.filter_map(|v| view.position(v)) {
+                count += places.iter().filter(|m| frustum.contains(m.transform_point3(p))).count();
+            }
+        }
+        count
+    }
+
+    /// Bytes that all views share, bytes of the views that grow with what is shown, and bytes of their tables over the finest meshes.
+    pub fn bytes(&self) -> [usize; 3] {
+        self.views.iter().fold([0; 3], |[s, a, t], v| {
+            let (shown, tables) = v.bytes();
+            [s + v.hierarchy().bytes(), a + shown, t + tables]
+        })
+    }
+}

@@ -1,0 +1,86 @@
+//! Measures what is shown, without the code that decides what to show.
+
+use super::SelectiveScene;
+use crate::refine::view::Camera;
+use crate::simplify::measure::{MeasureError, Surface};
+use glam::DVec3;
+
+/// Samples of the finest surface, spread evenly over its area.
+#[derive(Clone, Debug)]
+pub struct Judge {
+    /// Places and normals, world space.
+    samples: Vec<[DVec3; 2]>,
+}
+
+/// What a [`Judge`] found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Judgement {
+    /// Samples inside the frustum that face the camera.
+    pub visible: usize,
+    /// The largest lambda * distance / depth among them, pixels; 0 if none is visible.
+    pub max_pixels: f64,
+    /// The mean.
+    pub mean_pixels: f64,
+}
+
+impl Judge {
+    /// `count` samples of the finest surface, the same every time: places of a sequence of low discrepancy, by area.
+    ///
+    /// Errors: a damaged mesh.
+    pub fn new(scene: &SelectiveScene, count: usize) -> Result<Judge, super::SelectiveError> {
+        let mut faces: Vec<[DVec3; 3]> = Vec::new();
+        for (mesh, (view, places)) in scene.views.iter().zip(&scene.places).enumerate() {
+            let damage = |source| super::SelectiveError::Damage { mesh, source };
+            let mut full = view.hierarchy().mesh().cursor().map_err(damage)?;
+            full.seek(usize::MAX).map_err(damage)?;
+            for m in places {
+                let at = |w: &u32| m.transform_point3(full.positions().get(full.wedge_vertex(*w) as usize));
+                faces.extend(full.indices().iter().map(|[a, b, c]| [at(a), at(b), at(c)]));
+            }
+        }
+        let normal = |t: &[DVec3; 3]| (t[1] - t[0]).cross(t[2] - t[0]);
+        let mut sum = 0.0;
+        let areas: Vec<f64> = faces
+            .iter()
+            .map(|t| {
+                sum += normal(t).length();
+                sum
+            })
+            .collect();
+        // R3 (Roberts): steps of powers of the root of x^4 = x + 1.
+        let step = |k: i32| 1.220_744_084_605_759_5_f64.powi(-k);
+        let sample = |i: usize| {
+            let at = |k: i32| (0.5 + step(k) * (i + 1) as f64).fract();
+            let t =
+                faces.get(areas.partition_point(|&a| a <= at(1) * sum).min(faces.len().saturating_sub(1)))?;
+            let (u, v) = (at(2).sqrt(), at(3));
+            Some([t[0] * (1.0 - u) + t[1] * (u * (1.0 - v)) + t[2] * (u * v), normal(t)])
+        };
+        Ok(Judge { samples: (0..count).filter_map(sample).collect() })
+    }
+
+    /// Measures what `scene` shows, seen by `camera`. O(faces shown + samples log faces).
+    ///
+    /// Errors: nothing is shown, or positions that no distances can be computed of.
+    pub fn measure(&self, scene: &SelectiveScene, camera: &Camera) -> Result<Judgement, MeasureError> {
+        let triangles = scene.triangles();
+        let points: Vec<[f64; 3]> = triangles.as_flattened().iter().map(|p| p.to_array()).collect();
+        let indices: Vec<[u32; 3]> =
+            (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let surface = Surface::new(&points[..], &indices)?;
+        let mut query = surface.query();
+        let frustum = camera.frustum();
+        let mut out = Judgement::default();
+        for &[p, normal] in &self.samples {
+            let line = if camera.is_perspective() { p - camera.eye() } else { camera.look() };
+            if line.dot(normal) < 0.0 && frustum.contains(p) {
+                let pixels = camera.pixels(query.distance(p), camera.depth(p));
+                out.visible += 1;
+                out.max_pixels = out.max_pixels.max(pixels);
+                out.mean_pixels += pixels;
+            }
+        }
+        out.mean_pixels /= out.visible.max(1) as f64;
+        Ok(out)
+    }
+}
