@@ -14,6 +14,8 @@ mod convert;
 mod cull;
 mod decode;
 mod encode;
+mod extract;
+mod fly;
 mod generate;
 mod heatmap;
 mod info;
@@ -51,6 +53,8 @@ enum Command {
     Decode(decode::Args),
     Lod(Box<lod::Args>),
     Morph(morph::Args),
+    Extract(Box<extract::Args>),
+    Fly(Box<fly::Args>),
     Compare(compare::Args),
     Convert(convert::Args),
     Clip(Box<clip::Args>),
@@ -125,6 +129,8 @@ pub(crate) fn main() -> ExitCode {
         Command::Decode(args) => args.run(),
         Command::Lod(args) => args.run(),
         Command::Morph(args) => args.run(),
+        Command::Extract(args) => args.run(),
+        Command::Fly(args) => args.run(),
         Command::Compare(args) => args.run(),
         Command::Convert(args) => args.run(),
         Command::Clip(args) => args.run(),

@@ -62,6 +62,11 @@ impl PictureArgs {
 }
 
 impl Drawing {
+    /// Draws what follows as this view sees it.
+    pub(crate) fn through(&mut self, view: View) {
+        self.view = Some(view);
+    }
+
     /// Draws a scene, to the right of those before.
     pub(crate) fn add(&mut self, scene: &Scene) -> Result<(), SurfaceError> {
         let start = Instant::now();
@@ -86,6 +91,11 @@ impl Drawing {
         self.seconds += start.elapsed().as_secs_f64();
         Ok(())
     }
+}
+
+/// Makes a directory for pictures, if it is not there.
+pub(crate) fn make_directory(path: &std::path::Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(path).map_err(|e| Failure::Output(format!("{}: {e}", path.display())))
 }
 
 /// What is shown may be more than the file holds, for instances count each; or less, for a mesh may be shown by no node.

@@ -1,6 +1,7 @@
 //! Where a picture is taken from.
 
 use super::surface::Surface;
+use crate::refine::view::Camera;
 use glam::{DVec2, DVec3};
 
 /// How depth changes size.
@@ -82,6 +83,28 @@ impl View {
         };
         view.scale = view.fitting_scale();
         view
+    }
+
+    /// What a camera sees, but for the plane that cuts off what is far.
+    pub fn of_camera(camera: &Camera) -> View {
+        // Depth in radii is what `w` comes to with the centre one radius before the eye.
+        let (radius, projection) = match camera.is_perspective() {
+            true => (camera.near() / NEAR, Projection::Perspective { distance: 1.0 }),
+            false => (1.0, Projection::Orthographic),
+        };
+        let scale = if camera.is_perspective() { 1.0 } else { radius };
+        View {
+            centre: camera.eye() + if camera.is_perspective() { radius * camera.look() } else { DVec3::ZERO },
+            radius,
+            right: camera.right(),
+            up: camera.up(),
+            look: camera.look(),
+            half: DVec3::ZERO,
+            projection,
+            scale: camera.pixel_scale() * scale,
+            width: camera.width().clamp(1, LARGEST),
+            height: camera.height().clamp(1, LARGEST),
+        }
     }
 
     /// Half from the front, from the right and from above, with y upwards.
@@ -235,6 +258,31 @@ mod tests {
                     reach = reach.max(x.abs()).max(y.abs());
                 }
                 assert!(reach <= 0.5 * FILL + 1e-9 && reach > 0.3, "{reach}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_camera_sees_points_where_it_projects_them() {
+        use crate::refine::view::{CameraParameters, Projection as Kind};
+        for projection in [Kind::Perspective { fov_y_deg: 50.0 }, Kind::Orthographic { ortho_height: 7.0 }] {
+            let camera = Camera::new(&CameraParameters {
+                eye: DVec3::new(1.0, 2.0, 30.0),
+                target: DVec3::new(0.5, 0.0, 0.0),
+                up: DVec3::new(0.1, 1.0, 0.0),
+                projection,
+                width: 300,
+                height: 200,
+                near: 0.5,
+                far: 100.0,
+            })
+            .unwrap();
+            let view = View::of_camera(&camera);
+            for p in [DVec3::ZERO, DVec3::new(2.0, -1.0, 3.0), DVec3::new(-1.0, 3.0, -8.0)] {
+                let (pixel, _) = camera.project(p).unwrap();
+                let s = view.see(p).unwrap();
+                let seen = DVec2::new(150.0 + s.x / s.w, 100.0 + s.y / s.w);
+                assert!(seen.distance(pixel) < 1e-9, "{seen} {pixel}");
             }
         }
     }

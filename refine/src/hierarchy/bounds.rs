@@ -1,7 +1,7 @@
 //! Bounds of splits, packed into ten bytes.
 
 use crate::view::NormalCone;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// What is known of all that lies below a split.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +58,18 @@ impl Cone {
             return NormalCone::ALL;
         }
         NormalCone::new(unpack_direction(self.axis), self.angle as f64 / STEPS * std::f64::consts::FRAC_PI_2)
+    }
+}
+
+impl Cone {
+    /// Axis, and cosine and sine of the half angle; a cosine of -1 for a cone that tells nothing.
+    #[inline]
+    pub(crate) fn unpack_parts(self) -> (Vec3, f32, f32) {
+        if self.angle == WIDE {
+            return (Vec3::Z, -1.0, 0.0);
+        }
+        let (sin, cos) = (self.angle as f32 * (std::f32::consts::FRAC_PI_2 / STEPS as f32)).sin_cos();
+        (unpack_direction(self.axis).as_vec3(), cos, sin)
     }
 }
 

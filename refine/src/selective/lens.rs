@@ -173,12 +173,15 @@ impl Lens {
         if !self.back {
             return true;
         }
-        let cone = e.cone().unpack();
-        !if self.perspective {
-            cone.faces_away_from(self.eye, centre, radius)
-        } else {
-            cone.faces_along(self.look)
+        // As `NormalCone::faces_away_from` and `faces_along`: the least dot product of a direction of the cone with the line of sight.
+        let (line, reach) = if self.perspective { (centre - self.eye, radius) } else { (self.look, 0.0) };
+        let axis = e.axis.as_dvec3();
+        let along = line.dot(axis);
+        if along <= 0.0 || e.cos <= 0.0 {
+            return true;
         }
+        let across = (line.length_squared() - along * along).max(0.0).sqrt();
+        along * (e.cos as f64) - across * (e.sin as f64) < reach
     }
 }
 

@@ -1,36 +1,35 @@
 //! Splits that may come next, with what is needed to decide about each in one run of memory.
 
 use crate::aif::NONE;
-use crate::hierarchy::unpack;
-use crate::hierarchy::{Cone, Hierarchy};
+use crate::hierarchy::{Cone, Hierarchy, unpack};
 use glam::Vec3;
 
-/// A split and its bounds, 32 B.
+/// A split and its bounds, ready to be decided about, 44 B.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     pub(super) centre: Vec3,
     pub(super) radius: f32,
     pub(super) error: f32,
     pub(super) split: u32,
-    pub(super) axis: u32,
-    pub(super) angle: u16,
+    /// The normal cone's axis, and cosine and sine of its half angle. Stored cones are wider by 2e-5 rad, so that rounding to f32 does not show.
+    pub(super) axis: Vec3,
+    pub(super) cos: f32,
+    pub(super) sin: f32,
 }
 
 impl Entry {
     pub(super) fn of(h: &Hierarchy, i: u32) -> Entry {
         let (b, k) = (&h.bounds, i as usize);
+        let (axis, cos, sin) = Cone { axis: b.axis[k], angle: b.angle[k] }.unpack_parts();
         Entry {
             centre: h.local_centre(i),
             radius: unpack(b.radius[k]),
             error: unpack(b.error[k]),
             split: i,
-            axis: b.axis[k],
-            angle: b.angle[k],
+            axis,
+            cos,
+            sin,
         }
-    }
-
-    pub(super) fn cone(&self) -> Cone {
-        Cone { axis: self.axis, angle: self.angle }
     }
 }
 

@@ -1,0 +1,253 @@
+//! `progmesh extract IN OUT --camera CAM`.
+
+use super::args::{self, Input, Output};
+use super::common::{self, Warnings, short, thousands};
+use super::control::{Interrupt, Progress};
+use super::method::Making;
+use super::picture::PictureArgs;
+use super::{Failure, camera};
+use clap::ValueEnum;
+use progmesh::pipeline::build_progressive;
+use progmesh::progressive::ProgressiveScene;
+use progmesh::refine::hierarchy;
+use progmesh::refine::selective::Cull;
+use progmesh::report::View;
+use progmesh::selective::SelectiveScene;
+use progmesh::simplify::Stop;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Write a mesh as fine as one view needs it: parts that are far, out of sight or turned away are left coarse.
+///
+/// Of a mesh a progressive mesh is made first; a .pm is refined as it is. Where the camera sees the surface from its front, what is written
+/// deviates from the input by no more than --tau pixels. That is measured when the bounds are made, with a margin, not proven.
+#[derive(clap::Args, Debug)]
+#[command(after_help = "\
+Examples:
+  progmesh extract dragon.ply near.ply --camera cam.json --tau 1
+  progmesh extract scene.pm view.glb --camera scene.glb#door --budget-faces 20000
+  progmesh extract scan.ply out.obj --camera cam.json --cull none --png out.png --wireframe
+
+Exit code 1 means: done and written, but the base has more faces than --budget-faces.")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    input: Input,
+    #[command(flatten)]
+    output: Output,
+    /// The camera: CAM.json (docs/camera.md), or scene.glb, or scene.glb#NAME
+    #[arg(long, value_name = "CAM")]
+    camera: String,
+    #[command(flatten)]
+    needs: Needs,
+    #[command(flatten)]
+    making: Making,
+    #[command(flatten)]
+    picture: PictureArgs,
+    /// Print one JSON object about the run on standard output (see docs/json.md)
+    #[arg(long)]
+    json: bool,
+    /// Say nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// What a view needs.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Needs {
+    /// The largest error, pixels: 0 shows all there is, inf the base
+    #[arg(long, value_name = "PIXELS", value_parser = tolerance, default_value = "1", allow_negative_numbers = true,
+          help_heading = "View")]
+    pub(crate) tau: f64,
+    /// At most this many faces; the tolerance rises as far as it must
+    #[arg(long, value_name = "N", value_parser = args::positive, allow_negative_numbers = true, help_heading = "View")]
+    pub(crate) budget_faces: Option<usize>,
+    /// What to leave coarse however near it is
+    #[arg(long, value_enum, default_value_t = CullName::All, help_heading = "View")]
+    cull: CullName,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum CullName {
+    /// Nothing
+    None,
+    /// What is outside of the picture
+    Frustum,
+    /// What turns its back
+    Cone,
+    /// Both
+    All,
+}
+
+impl Needs {
+    pub(crate) fn cull(&self) -> Cull {
+        match self.cull {
+            CullName::None => Cull::None,
+            CullName::Frustum => Cull::Frustum,
+            CullName::Cone => Cull::Cone,
+            CullName::All => Cull::All,
+        }
+    }
+}
+
+/// Pixels, 0 or more; infinitely many too.
+fn tolerance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x >= 0.0 => Ok(x),
+        _ => Err("must be a number of pixels, 0 or more, or inf".into()),
+    }
+}
+
+/// What it took to have a scene that can be refined.
+pub(crate) struct Made {
+    pub(crate) scene: SelectiveScene,
+    /// Reading, and making progressive meshes.
+    pub(crate) read: f64,
+    /// Hierarchies and bounds.
+    pub(crate) bounds: f64,
+}
+
+/// Reads the input, as a progressive mesh or to make one of it, and builds the hierarchies.
+pub(crate) fn make(
+    input: &Input,
+    making: &Making,
+    quiet: bool,
+    interrupt: &Interrupt,
+    warnings: &mut Warnings,
+) -> Result<Made, Failure> {
+    let start = Instant::now();
+    let job = making.job()?;
+    let file = input.name();
+    let failed = |e: &dyn std::fmt::Display| Failure::Input(format!("{file}: {e}"));
+    let read: ProgressiveScene = input.read_or_make(warnings, |scene, warnings| {
+        interrupt.be_graceful();
+        let progress = Progress::new(interrupt, quiet, "simplifying");
+        let built = build_progressive(scene, &job, &progress).map_err(|e| failed(&e))?;
+        if built.stop == Stop::Cancelled {
+            return Err(Failure::Interrupted);
+        }
+        warnings.say(built.warnings.iter().map(|w| format!("{file}: {w}")));
+        Ok(built.scene)
+    })?;
+    interrupt.be_graceful();
+    let (read_seconds, start) = (start.elapsed().as_secs_f64(), Instant::now());
+    let scene = SelectiveScene::new(read, &hierarchy::Options::default()).map_err(|e| failed(&e))?;
+    if interrupt.is_set() {
+        return Err(Failure::Interrupted);
+    }
+    Ok(Made { scene, read: read_seconds, bounds: start.elapsed().as_secs_f64() })
+}
+
+impl Args {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let start = Instant::now();
+        self.output.leave_room_for(self.json)?;
+        let mut warnings = Warnings::new(self.quiet);
+        let format = self.output.format(&mut warnings)?;
+        let mut drawing = self.picture.drawing()?;
+        let camera = camera::read(&self.camera, &mut warnings)?;
+        let file = self.input.name();
+        let interrupt = Interrupt::watch();
+        let (report, full) = common::in_pool(self.making.collapsing.threads, || {
+            let mut made = make(&self.input, &self.making, self.quiet, &interrupt, &mut warnings)?;
+            let refining = Instant::now();
+            let most = self.needs.budget_faces;
+            let tau = made.scene.extract(&camera, self.needs.tau, self.needs.cull(), most);
+            let tau = tau.map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+            let refine = refining.elapsed().as_secs_f64();
+            let scene = made.scene.to_scene();
+            if interrupt.is_set() {
+                return Err(Failure::Interrupted);
+            }
+            if let Some(d) = &mut drawing {
+                d.through(View::of_camera(&camera));
+                d.add(&scene).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+            }
+            let writing = Instant::now();
+            self.output.write(format, &scene, &interrupt, &mut warnings)?;
+            let write = writing.elapsed().as_secs_f64();
+            drawing.as_mut().map_or(Ok(()), |d| d.write())?;
+            let splits = made.scene.views().iter().map(|v| v.applied().count()).sum();
+            let report = Report {
+                command: "extract",
+                to: format.extension(),
+                tau: tau.is_finite().then_some(tau),
+                faces: made.scene.face_count(),
+                vertices: made.scene.vertex_count(),
+                splits,
+                full_faces: made.scene.full_faces(),
+                full_splits: made.scene.views().iter().map(|v| v.hierarchy().splits()).sum(),
+                visible_vertices: made.scene.visible_vertices(&camera),
+                seconds: Seconds {
+                    read: made.read,
+                    bounds: made.bounds,
+                    refine,
+                    write,
+                    total: start.elapsed().as_secs_f64(),
+                },
+                warnings: vec![],
+            };
+            Ok((report, made.scene.full_faces()))
+        })?;
+        let report = Report { warnings: warnings.all, ..report };
+        if !self.quiet {
+            let at = report.tau.map_or("inf".into(), short);
+            common::note(&format!(
+                "{file}: {} of {} faces at {at} pixels; {:.3} s (read {:.3}, bounds {:.3}, refine {:.3}, write {:.3})",
+                thousands(report.faces),
+                thousands(full),
+                report.seconds.total,
+                report.seconds.read,
+                report.seconds.bounds,
+                report.seconds.refine,
+                report.seconds.write
+            ));
+        }
+        if self.json {
+            common::print_json(&report)?;
+        }
+        match self.needs.budget_faces {
+            Some(n) if report.faces > n => Err(Failure::Missed(format!(
+                "{file}: {} faces left, more than the {} asked for: that is the base, nothing is coarser",
+                thousands(report.faces),
+                thousands(n)
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The schema of `--json`; docs/json.md says what each field means.
+#[derive(Serialize)]
+struct Report {
+    command: &'static str,
+    to: &'static str,
+    tau: Option<f64>,
+    faces: usize,
+    vertices: usize,
+    splits: usize,
+    full_faces: usize,
+    full_splits: usize,
+    visible_vertices: usize,
+    seconds: Seconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Seconds {
+    read: f64,
+    bounds: f64,
+    refine: f64,
+    write: f64,
+    total: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tolerance_is_not_negative_and_may_be_infinite() {
+        assert_eq!((tolerance("0"), tolerance("inf")), (Ok(0.0), Ok(f64::INFINITY)));
+        assert!(["-1", "nan", "", "x"].iter().all(|t| tolerance(t).is_err()));
+    }
+}

@@ -1,0 +1,174 @@
+//! What a flight came to.
+
+use super::common::{short, thousands};
+use serde::Serialize;
+
+/// The schema of `--json`; docs/json.md says what each field means.
+#[derive(Serialize)]
+pub(super) struct Report {
+    command: &'static str,
+    path: String,
+    tau: Option<f64>,
+    full_faces: usize,
+    frame_count: usize,
+    faces: Statistics,
+    vsplits: Statistics,
+    ecols: Statistics,
+    us: Statistics,
+    dirty_index_bytes: Statistics,
+    operations_per_second: Option<f64>,
+    measured_over_tau: Option<Statistics>,
+    pub(super) above: usize,
+    memory: Memory,
+    frames: Vec<Frame>,
+    seconds: Seconds,
+    pub(super) warnings: Vec<String>,
+}
+
+/// A frame.
+#[derive(Serialize)]
+pub(super) struct Frame {
+    pub(super) faces: usize,
+    pub(super) vertices: usize,
+    pub(super) vsplits: usize,
+    pub(super) ecols: usize,
+    pub(super) us: f64,
+    pub(super) tau: Option<f64>,
+    pub(super) complete: bool,
+    pub(super) visible_vertices: usize,
+    pub(super) dirty_index_bytes: usize,
+    pub(super) dirty_wedges: usize,
+    pub(super) measured: Option<Measured>,
+}
+
+#[derive(Clone, Copy, Serialize)]
+pub(super) struct Measured {
+    pub(super) samples: usize,
+    pub(super) max_pixels: f64,
+    pub(super) mean_pixels: f64,
+}
+
+#[derive(Serialize)]
+pub(super) struct Memory {
+    pub(super) shared_bytes: usize,
+    pub(super) shared_bytes_per_vertex: f64,
+    pub(super) view_bytes: usize,
+    pub(super) view_table_bytes: usize,
+    pub(super) most_vertices: usize,
+}
+
+#[derive(Serialize)]
+struct Seconds {
+    read: f64,
+    bounds: f64,
+}
+
+/// Of all frames but the first, which starts from the base.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+struct Statistics {
+    mean: f64,
+    p50: f64,
+    p99: f64,
+    max: f64,
+}
+
+impl Statistics {
+    /// `None` of nothing. Percentiles by nearest rank.
+    fn of(values: impl Iterator<Item = f64>) -> Option<Statistics> {
+        let mut all: Vec<f64> = values.collect();
+        all.sort_by(f64::total_cmp);
+        let rank = |p: f64| ((p * all.len() as f64).ceil() as usize).clamp(1, all.len()) - 1;
+        let max = *all.last()?;
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        Some(Statistics { mean, p50: all[rank(0.5)], p99: all[rank(0.99)], max })
+    }
+}
+
+impl Report {
+    pub(super) fn new(
+        path: String,
+        tau: f64,
+        full_faces: usize,
+        frames: Vec<Frame>,
+        memory: Memory,
+        [read, bounds]: [f64; 2],
+    ) -> Report {
+        // A flight of one frame is that frame.
+        let later = if frames.len() > 1 { &frames[1..] } else { &frames[..] };
+        let of = |f: &dyn Fn(&Frame) -> f64| {
+            let none = Statistics { mean: 0.0, p50: 0.0, p99: 0.0, max: 0.0 };
+            Statistics::of(later.iter().map(f)).unwrap_or(none)
+        };
+        let operations: usize = later.iter().map(|f| f.vsplits + f.ecols).sum();
+        let time: f64 = later.iter().map(|f| f.us * 1e-6).sum();
+        let ratios = || {
+            frames.iter().filter(|f| f.complete).filter_map(|f| {
+                let tau = f.tau.filter(|t| *t > 0.0)?;
+                f.measured.map(|m| m.max_pixels / tau)
+            })
+        };
+        Report {
+            command: "fly",
+            path,
+            tau: tau.is_finite().then_some(tau),
+            full_faces,
+            frame_count: frames.len(),
+            faces: of(&|f| f.faces as f64),
+            vsplits: of(&|f| f.vsplits as f64),
+            ecols: of(&|f| f.ecols as f64),
+            us: of(&|f| f.us),
+            dirty_index_bytes: of(&|f| f.dirty_index_bytes as f64),
+            operations_per_second: (operations > 0 && time > 0.0).then(|| operations as f64 / time),
+            measured_over_tau: Statistics::of(ratios()),
+            above: ratios().filter(|r| *r > 1.0).count(),
+            memory,
+            seconds: Seconds { read, bounds },
+            warnings: vec![],
+            frames,
+        }
+    }
+
+    /// For people.
+    pub(super) fn text(&self, file: &str) -> Vec<String> {
+        let s = |name: &str, x: &Statistics| {
+            let of = |v: f64| if v >= 1000.0 { thousands(v.round() as usize) } else { short(v) };
+            let [mean, p50, p99, max] = [x.mean, x.p50, x.p99, x.max].map(of);
+            format!("  {name:<22} mean {mean:>9}  p50 {p50:>9}  p99 {p99:>9}  max {max:>9}")
+        };
+        let mut lines = vec![format!(
+            "{file}: {} frames of {} faces along {}",
+            thousands(self.frame_count),
+            thousands(self.full_faces),
+            self.path
+        )];
+        lines.push(s("faces", &self.faces));
+        lines.push(s("vertex splits", &self.vsplits));
+        lines.push(s("collapses", &self.ecols));
+        lines.push(s("microseconds", &self.us));
+        lines.push(s("index bytes to upload", &self.dirty_index_bytes));
+        if let Some(m) = &self.measured_over_tau {
+            lines.push(s("measured error / tau", m));
+        }
+        lines.push(format!(
+            "  shared {} B a vertex; a view {} B for {} vertices shown at most, and {} B of tables",
+            short(self.memory.shared_bytes_per_vertex),
+            thousands(self.memory.view_bytes),
+            thousands(self.memory.most_vertices),
+            thousands(self.memory.view_table_bytes)
+        ));
+        lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_by_nearest_rank() {
+        let s = Statistics::of((1..=200).rev().map(f64::from)).unwrap();
+        assert_eq!(s, Statistics { mean: 100.5, p50: 100.0, p99: 198.0, max: 200.0 });
+        assert_eq!(Statistics::of([3.0].into_iter()).unwrap().p99, 3.0);
+        assert!(Statistics::of(std::iter::empty()).is_none());
+    }
+}
