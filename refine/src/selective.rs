@@ -121,7 +121,8 @@ impl View {
     /// True if all that split `i` depends on is applied, and it is not: the l/r rule. Panics if there is no such split.
     pub fn may_split(&self, i: usize) -> bool {
         let applied = |d: u32| d == NONE || self.front.is_applied(d);
-        !self.is_applied(i) && self.hierarchy.forest.needs(i as u32).into_iter().all(applied)
+        !self.is_applied(i)
+            && self.hierarchy.forest.needs(self.hierarchy.mesh(), i as u32).into_iter().all(applied)
     }
 
     /// True if split `i` is applied and nothing applied depends on it. Panics if there is no such split.
@@ -144,7 +145,8 @@ impl View {
         }
         let mut k = from;
         while let Some(&j) = out.get(k) {
-            for d in self.hierarchy.forest.needs(j).into_iter().filter(|&d| d != NONE) {
+            for d in self.hierarchy.forest.needs(self.hierarchy.mesh(), j).into_iter().filter(|&d| d != NONE)
+            {
                 let (word, bit) = (d as usize / 64, 1u64 << (d % 64));
                 if self.marked[word] & bit == 0 && !self.front.is_applied(d) {
                     self.marked[word] |= bit;
@@ -169,7 +171,7 @@ impl View {
         }
         self.open.remove(i, &mut self.place);
         self.last.push(h, i, &mut self.place);
-        for d in h.forest.needs(i).into_iter().filter(|&d| d != NONE) {
+        for d in h.forest.needs(h.mesh(), i).into_iter().filter(|&d| d != NONE) {
             self.last.remove(d, &mut self.place);
         }
         h.forest.nodes(i).into_iter().for_each(|k| self.offer(k));
@@ -187,7 +189,7 @@ impl View {
         self.front.unsplit(h.mesh(), &h.forest, i);
         self.last.remove(i, &mut self.place);
         self.open.push(&h, i, &mut self.place);
-        for d in h.forest.needs(i).into_iter().filter(|&d| d != NONE) {
+        for d in h.forest.needs(h.mesh(), i).into_iter().filter(|&d| d != NONE) {
             if self.front.is_free(d) && self.place[d as usize] == NONE {
                 self.last.push(&h, d, &mut self.place);
             }

@@ -412,6 +412,37 @@ fn limits_hold_and_a_frame_cut_short_is_taken_up_again() {
 }
 
 #[test]
+fn splits_that_only_others_need_have_not_moved_and_those_much_needed_have_wholly() {
+    let h = hierarchy("scan", 6000);
+    let mut random = Random(31);
+    let c = camera(&h, &mut random, 0.8, true);
+    let lens = Lens::new(&h, &c, &DMat4::IDENTITY, 1.0, Cull::All).unwrap();
+    let mut view = View::new(h.clone());
+    view.adapt(&lens, &Limits::default());
+    let n0 = h.mesh().base_vertices();
+    let (mut still, mut moved, mut between) = (0, 0, 0);
+    for i in 0..h.splits() {
+        if !view.may_collapse(i) {
+            continue;
+        }
+        let (vs, vu) = (h.mesh().splits.vertex[i], (n0 + i) as u32);
+        let at = |v: u32| view.morphed(&lens, v, 2.0).unwrap();
+        if lens.pixels(&h, &h.bounds(i)) >= 2.0 && lens.needs(&h, i) {
+            assert_eq!(at(vu), view.position(vu).unwrap());
+            moved += 1;
+        } else if at(vs) != at(vu) && at(vu) != view.position(vu).unwrap() {
+            between += 1;
+        }
+        // Just at its tolerance it is where it came from, so that undoing it does not show.
+        let later = lens.with_tau(lens.pixels(&h, &h.bounds(i)) * (1.0 + 1e-9)).unwrap();
+        assert_eq!(view.morphed(&later, vs, 2.0), view.morphed(&later, vu, 2.0));
+        still += 1;
+    }
+    assert!(still > 50 && between > 50, "{still} {between} {moved}");
+    assert!(view.morphed(&lens, 0, 2.0).is_some());
+}
+
+#[test]
 fn dirty_ranges_hold_all_that_changed_and_not_all_there_is() {
     let h = hierarchy("quad-sphere", 4000);
     let mut view = View::new(h.clone());
@@ -527,7 +558,8 @@ fn what_is_shown_deviates_by_less_than_the_tolerance() {
         }
         ratios.sort_by(f64::total_cmp);
         assert!(ratios[15] <= 1.0, "{name}: {ratios:.2?}");
-        // Not bought by showing too much. Flat parts have no error at all.
-        assert!(name == "cad" || ratios[8] >= 0.35, "{name}: {ratios:.2?}");
+        // Not bought by showing too much, in views that do not need all there is. Flat parts have no error at all.
+        ratios.retain(|&r| r > 1e-3);
+        assert!(name == "cad" || ratios[ratios.len() / 2] >= 0.3, "{name}: {ratios:.2?}");
     }
 }

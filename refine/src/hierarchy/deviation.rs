@@ -1,6 +1,6 @@
 //! Spheres, cones and errors of all splits, from walks from the finest mesh to the base.
 //!
-//! Samples of the finest mesh, its vertices and the middles of its edges, lie in buckets of the faces that are nearest to them. When a split is
+//! Samples of the finest mesh, its vertices and quarters of its edges, lie in buckets of the faces that are nearest to them. When a split is
 //! undone, the samples around it look for their nearest face again: among those around the vertex, and from there from face to face. What is
 //! found is a distance to some face, so never below the true one.
 
@@ -14,8 +14,10 @@ use crate::simplify::measure::closest_on_triangle;
 use crate::view::NormalCone;
 use glam::DVec3;
 
-/// Samples a face beyond which only the vertices among them are kept: there are enough then.
-const ENOUGH: usize = 24;
+/// Samples a face of a star beyond which quarters of edges are left out, and then middles: there are enough vertices for it by then.
+const ENOUGH: usize = 10;
+/// Samples a face of a star beyond which some of its vertices are left out: half of those kept are the farthest, the others spread.
+const PLENTY: usize = 12;
 /// Faces that a sample walks over at most, beyond the star it lay on.
 const WALK: usize = 32;
 
@@ -24,6 +26,31 @@ struct Sample {
     /// The vertices of its edge; a vertex has itself twice.
     owners: [u32; 2],
     next: u32,
+    /// Its distance when it was last looked for.
+    distance: f32,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Kind {
+    Vertex,
+    Middle,
+    Quarter,
+}
+
+/// A triangle in a sphere.
+struct Reach {
+    corners: [DVec3; 3],
+    middle: DVec3,
+    radius: f64,
+}
+
+impl Reach {
+    fn of(corners: [DVec3; 3]) -> Reach {
+        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let radius = corners.iter().map(|c| c.distance(middle)).fold(0.0, f64::max) * (1.0 + 1e-9);
+        Reach { corners, middle, radius }
+    }
 }
 
 struct Walk<'a> {
@@ -78,7 +105,7 @@ pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: &Front, opti
             let odd = (k.x + k.y + k.z).rem_euclid(2.0) == 1.0;
             if cell.is_finite() && odd == (round % 2 == 0) { FAR } else { 1.0 }
         };
-        error = walk(&mut by_error(forest, |i| error[i as usize] * weight(i)).into_iter(), error);
+        error = walk(&mut by_error(pm, forest, |i| error[i as usize] * weight(i)).into_iter(), error);
     }
     // What was raised in one order, is raised in the hierarchy.
     for i in (0..n as u32).rev() {
@@ -97,12 +124,12 @@ pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: &Front, opti
 const FAR: f64 = 1.0 / 64.0;
 
 /// All splits in an order in which they can be undone: those of the least errors first, and what depends on a split before it.
-fn by_error(forest: &Forest, error: impl Fn(u32) -> f64) -> Vec<u32> {
+fn by_error(pm: &ProgressiveMesh, forest: &Forest, error: impl Fn(u32) -> f64) -> Vec<u32> {
     let n = forest.len() as u32;
     let mut least: Vec<f64> = (0..n).map(error).collect();
     for i in (0..n).rev() {
         let e = least[i as usize];
-        for d in forest.needs(i).into_iter().filter(|&d| d != NONE) {
+        for d in forest.needs(pm, i).into_iter().filter(|&d| d != NONE) {
             let up = &mut least[d as usize];
             *up = up.max(e);
         }
@@ -169,22 +196,25 @@ impl<'a> Walk<'a> {
         corners: &[[u32; 3]],
         error: Vec<f64>,
     ) -> Self {
-        let mut samples: Vec<Sample> = Vec::with_capacity(4 * positions.len());
+        let mut samples: Vec<Sample> = Vec::with_capacity(10 * positions.len());
         let mut first = vec![NONE; corners.len()];
         let mut seen = vec![false; positions.len()];
         for (slot, f) in corners.iter().enumerate() {
-            let mut add = |at: DVec3, owners: [u32; 2]| {
-                samples.push(Sample { at, owners, next: first[slot] });
+            let mut add = |at: DVec3, owners: [u32; 2], kind: Kind| {
+                samples.push(Sample { at, owners, next: first[slot], distance: 0.0, kind });
                 first[slot] = (samples.len() - 1) as u32;
             };
             for k in 0..3 {
                 let (a, b) = (f[k], f[(k + 1) % 3]);
                 if !std::mem::replace(&mut seen[a as usize], true) {
-                    add(positions[a as usize], [a, a]);
+                    add(positions[a as usize], [a, a], Kind::Vertex);
                 }
                 // Once an edge, by the face in the lower slot.
                 if front.across(slot as u32, k).is_none_or(|o| slot as u32 <= o) {
-                    add(0.5 * (positions[a as usize] + positions[b as usize]), [a, b]);
+                    let (p, q) = (positions[a as usize], positions[b as usize]);
+                    add(p.lerp(q, 0.5), [a, b], Kind::Middle);
+                    add(p.lerp(q, 0.25), [a, b], Kind::Quarter);
+                    add(p.lerp(q, 0.75), [a, b], Kind::Quarter);
                 }
             }
         }
@@ -242,24 +272,49 @@ impl<'a> Walk<'a> {
         if let Some(h) = beside {
             self.front.star(h, &mut star);
         }
-        if loose.len() > ENOUGH * star.len() {
-            let samples = &self.samples;
-            loose.retain(|&s| samples[s as usize].owners[0] == samples[s as usize].owners[1]);
-        }
-        let triangles: Vec<[DVec3; 3]> = star.iter().map(|&s| self.triangle(s)).collect();
+        self.thin(&mut loose, star.len());
+        let triangles: Vec<Reach> = star.iter().map(|&s| Reach::of(self.triangle(s))).collect();
         for s in loose {
             self.place(s, vs, &star, &triangles);
         }
     }
 
+    /// Leaves out samples of a star with many.
+    fn thin(&self, loose: &mut Vec<u32>, faces: usize) {
+        let of = |s: u32| &self.samples[s as usize];
+        for kind in [Kind::Quarter, Kind::Middle] {
+            if loose.len() > ENOUGH * faces {
+                loose.retain(|&s| of(s).kind < kind);
+            }
+        }
+        let keep = PLENTY * faces;
+        if loose.len() > keep && keep > 0 {
+            let far = keep / 2;
+            loose.select_nth_unstable_by(far, |&a, &b| {
+                of(b).distance.total_cmp(&of(a).distance).then(a.cmp(&b))
+            });
+            // Those that are left of the order they were in lie about in no order at all.
+            let rest = loose.split_off(far);
+            let each = rest.len().div_ceil(keep - far);
+            loose.extend(rest.into_iter().step_by(each));
+        }
+    }
+
     /// Puts a sample on its nearest face, and raises the error of who answers for it.
-    fn place(&mut self, s: u32, vs: u32, star: &[u32], triangles: &[[DVec3; 3]]) {
+    fn place(&mut self, s: u32, vs: u32, star: &[u32], triangles: &[Reach]) {
         let p = self.samples[s as usize].at;
         let (mut best, mut slot, mut weights) = (f64::INFINITY, NONE, [0.0; 3]);
-        for (&f, &t) in star.iter().zip(triangles) {
-            let (w, d2) = closest_on_triangle(t, p);
+        // The one whose middle is nearest first: it rules most others out.
+        let off: Vec<f64> = triangles.iter().map(|t| t.middle.distance_squared(p)).collect();
+        let nearest = (0..off.len()).min_by(|&a, &b| off[a].total_cmp(&off[b]));
+        for k in nearest.into_iter().chain(0..off.len()) {
+            let reach = triangles[k].radius + best.sqrt();
+            if off[k] > reach * reach {
+                continue;
+            }
+            let (w, d2) = closest_on_triangle(triangles[k].corners, p);
             if d2 < best {
-                (best, slot, weights) = (d2, f, w);
+                (best, slot, weights) = (d2, star[k], w);
             }
         }
         // Beyond the star, while that is nearer.
@@ -284,6 +339,7 @@ impl<'a> Walk<'a> {
         }
         self.samples[s as usize].next = std::mem::replace(&mut self.first[slot as usize], s);
         let d = best.sqrt();
+        self.samples[s as usize].distance = d as f32;
         let owners = self.samples[s as usize].owners.map(|v| self.holder(v));
         let error = |w: &Self, v: u32| match w.candidate[v as usize] {
             NONE => None,

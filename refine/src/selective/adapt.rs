@@ -137,7 +137,7 @@ impl View {
                 self.undo(i);
                 meter.done.collapses += 1;
                 meter.since += 1;
-                let needs = self.hierarchy.forest.needs(i);
+                let needs = self.hierarchy.forest.needs(self.hierarchy.mesh(), i);
                 stack.extend(needs.into_iter().filter(|&d| d != NONE && self.front.is_free(d)));
             }
         }

@@ -241,7 +241,7 @@ impl Front {
         (self.node[vs as usize], self.node[vu as usize]) = (old, fresh);
         self.vertices += 1;
         self.applied[k / 64] |= 1 << (k % 64);
-        for d in forest.needs(i).into_iter().filter(|&d| d != NONE) {
+        for d in forest.needs(pm, i).into_iter().filter(|&d| d != NONE) {
             self.dependents[d as usize] += 1;
         }
         Ok(())
@@ -315,7 +315,7 @@ impl Front {
         }
         self.vertices -= 1;
         self.applied[k / 64] &= !(1 << (k % 64));
-        for d in forest.needs(i).into_iter().filter(|&d| d != NONE) {
+        for d in forest.needs(pm, i).into_iter().filter(|&d| d != NONE) {
             self.dependents[d as usize] -= 1;
         }
     }

@@ -1,0 +1,127 @@
+//! `extract` and `fly`, end to end.
+
+mod common;
+
+use common::Place;
+use serde_json::Value;
+
+const CAMERA: &str = r#"{"eye": [0.2, 0.3, 2.2], "target": [0, 0, 0], "up": [0, 1, 0], "fov_y_deg": 45, "width": 640,
+    "height": 480, "near": 0.01, "far": 100}"#;
+
+fn place() -> Place {
+    let p = Place::new();
+    p.write("cam.json", CAMERA);
+    p
+}
+
+#[test]
+fn a_tolerance_of_nothing_writes_the_input_and_one_of_everything_the_base() {
+    for (name, ending) in [("scan", "ply"), ("cad", "glb"), ("polygons", "off"), ("quad-sphere", "obj")] {
+        let p = place();
+        p.generate(name, &format!("in.{ending}"), 1500);
+        std::fs::create_dir_all(p.path("a")).unwrap();
+        std::fs::create_dir_all(p.path("b")).unwrap();
+        p.done(&format!("convert in.{ending} b/x.{ending} -q"));
+        p.done(&format!("extract in.{ending} a/x.{ending} --camera cam.json --tau 0 --cull none -q"));
+        assert_eq!(p.read(&format!("a/x.{ending}")), p.read(&format!("b/x.{ending}")), "{name}");
+        p.done(&format!("encode in.{ending} in.pm -q"));
+        p.done(&format!("extract in.pm a/y.{ending} --camera cam.json --tau 0 --cull none -q"));
+        assert_eq!(p.read(&format!("a/y.{ending}")), p.read(&format!("b/x.{ending}")), "{name} of its .pm");
+        let base = p.done(&format!("extract in.pm base.ply --camera cam.json --tau inf --json -q")).json();
+        let decoded = p.done("decode in.pm base2.ply --level 0 --json -q").json();
+        assert_eq!((&base["faces"], &base["tau"]), (&decoded["triangles"], &Value::Null));
+    }
+}
+
+#[test]
+fn one_view_takes_fewer_faces_than_all_of_it_and_a_budget_is_kept() {
+    let p = place();
+    p.generate("scan", "in.ply", 12_000);
+    p.done("encode in.ply in.pm -q");
+    let faces = |flags: &str| {
+        let r = p.done(&format!("extract in.pm out.ply --camera cam.json --json -q {flags}")).json();
+        assert_eq!(p.info("out.ply")["triangles"]["file"], r["faces"], "{flags}");
+        assert!(p.info("out.ply")["problems"].is_object() || p.info("out.ply").is_object());
+        r["faces"].as_u64().unwrap()
+    };
+    let (none, all) = (faces("--tau 2 --cull none"), faces("--tau 2"));
+    let (frustum, cone) = (faces("--tau 2 --cull frustum"), faces("--tau 2 --cull cone"));
+    assert!(all <= frustum.min(cone) && frustum.max(cone) <= none && all * 10 < none * 9, "{all} {none}");
+    assert!(faces("--tau 8") < all);
+    let budget = faces("--tau 0.1 --budget-faces 900");
+    assert!((700..=900).contains(&budget), "{budget}");
+    let run = p.run("extract in.pm out.ply --camera cam.json --budget-faces 3 -q");
+    assert_eq!(run.code, 1);
+    assert!(run.stderr.contains("that is the base"), "{}", run.stderr);
+    // The same from the mesh itself, for any number of threads.
+    p.done("extract in.ply a.ply --camera cam.json --threads 1 -q");
+    p.done("extract in.ply b.ply --camera cam.json --threads 3 -q --png shot.png");
+    assert_eq!(p.read("a.ply"), p.read("b.ply"));
+    assert_eq!(&p.read("shot.png")[1..4], b"PNG");
+}
+
+#[test]
+fn wrong_cameras_and_paths_are_named() {
+    let p = place();
+    p.generate("sphere", "in.ply", 500);
+    p.write("bad.json", CAMERA.replace("480", "0"));
+    p.write("nan.json", CAMERA.replace("2.2", "NaN"));
+    p.write("away.json", format!("[{}]", CAMERA.replace("[0, 0, 0]", "[9, 0, 20]")));
+    p.write("not.frames", "F 1 2 3\n");
+    p.write("empty.frames", "nothing here\n");
+    for (arguments, code, says) in [
+        ("extract in.ply out.ply --camera bad.json", 3, "bad.json: height"),
+        ("extract in.ply out.ply --camera nan.json", 3, "nan.json"),
+        ("extract in.ply out.ply --camera none.json", 3, "none.json"),
+        ("extract in.ply out.ply", 2, "--camera"),
+        ("extract in.ply out.ply --camera cam.json --tau -1", 2, "pixels"),
+        ("extract in.ply out.ply --camera cam.json --budget-faces 0", 2, "1 or more"),
+        ("fly in.ply --path none.json", 3, "none.json"),
+        ("fly in.ply --path not.frames", 3, "not.frames: line 1"),
+        ("fly in.ply --path empty.frames", 3, "no frames"),
+        ("fly in.ply --path away.json", 3, "no frame sees anything"),
+        ("fly in.ply --path circle --frames 0", 2, "1 or more"),
+        ("fly in.ply --path circle --hysteresis 0", 2, "0.1 to 1"),
+    ] {
+        let run = p.run(arguments);
+        assert_eq!(run.code, code, "{arguments}: {}", run.stderr);
+        assert!(run.stderr.contains(says), "{arguments}: {}", run.stderr);
+        assert!(!p.exists("out.ply"));
+    }
+}
+
+#[test]
+fn a_flight_reports_every_frame_and_what_is_shown_is_within_the_tolerance() {
+    let p = Place::new();
+    p.generate("scan", "in.ply", 8000);
+    p.done("encode in.ply in.pm -q");
+    let r = p.done("fly in.pm --path circle --frames 40 --tau 1.5 --measure-every 8 --samples 20000 --json -q").json();
+    let frames = r["frames"].as_array().unwrap();
+    assert_eq!((frames.len(), r["frame_count"].as_u64()), (40, Some(40)));
+    let number = |f: &Value, k: &str| f[k].as_f64().unwrap();
+    // From one frame to the next by what was applied and undone, one vertex each.
+    for w in frames.windows(2) {
+        let change = number(&w[1], "vsplits") - number(&w[1], "ecols");
+        assert_eq!(number(&w[1], "vertices") - number(&w[0], "vertices"), change);
+        assert!(number(&w[1], "visible_vertices") <= number(&w[1], "vertices"));
+        assert!(w[1]["complete"].as_bool().unwrap());
+    }
+    let measured: Vec<f64> =
+        frames.iter().filter_map(|f| f["measured"]["max_pixels"].as_f64()).collect();
+    assert_eq!(measured.len(), 5);
+    assert!(measured.iter().all(|&m| m <= 1.5 && m > 0.3), "{measured:?}");
+    assert_eq!(r["above"], 0);
+    assert!(r["faces"]["max"].as_f64().unwrap() < r["full_faces"].as_f64().unwrap());
+    // A budget: never more, and most of it used once the tolerance has followed.
+    let r = p.done("fly in.pm --path lemniscate --frames 60 --tau 0.2 --budget-faces 800 --json -q").json();
+    let frames = r["frames"].as_array().unwrap();
+    assert!(frames.iter().all(|f| number(f, "faces") <= 800.0));
+    assert!(frames.iter().skip(30).any(|f| number(f, "faces") > 600.0));
+    // Time: a frame that is cut short goes on in the next.
+    let r = p.done("fly in.pm --path circle --frames 12 --budget-us 1 --json -q").json();
+    assert!(r["frames"].as_array().unwrap().iter().all(|f| number(f, "vsplits") + number(f, "ecols") <= 128.0));
+    // For people, and pictures.
+    let run = p.done("fly in.pm --path circle --frames 3 --png-every 2 --png-to shots");
+    assert!(run.stderr.contains("vertex splits") && run.stdout.is_empty(), "{}", run.stderr);
+    assert!(p.exists("shots/frame00000.png") && p.exists("shots/frame00002.png") && !p.exists("shots/frame00001.png"));
+}
