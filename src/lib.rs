@@ -20,8 +20,8 @@ pub mod progressive;
 pub mod report;
 pub mod samples;
 pub mod scene;
-pub mod views;
 pub mod selective;
+pub mod views;
 
 /// The README's example must compile.
 #[cfg(all(doctest, feature = "files"))]

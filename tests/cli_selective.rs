@@ -21,13 +21,16 @@ fn a_tolerance_of_nothing_writes_the_input_and_one_of_everything_the_base() {
         p.generate(name, &format!("in.{ending}"), 1500);
         std::fs::create_dir_all(p.path("a")).unwrap();
         std::fs::create_dir_all(p.path("b")).unwrap();
+        std::fs::create_dir_all(p.path("c")).unwrap();
         p.done(&format!("convert in.{ending} b/x.{ending} -q"));
         p.done(&format!("extract in.{ending} a/x.{ending} --camera cam.json --tau 0 --cull none -q"));
-        assert_eq!(p.read(&format!("a/x.{ending}")), p.read(&format!("b/x.{ending}")), "{name}");
+        let same = p.read(&format!("a/x.{ending}")) == p.read(&format!("b/x.{ending}"));
+        assert!(same, "{name}");
         p.done(&format!("encode in.{ending} in.pm -q"));
-        p.done(&format!("extract in.pm a/y.{ending} --camera cam.json --tau 0 --cull none -q"));
-        assert_eq!(p.read(&format!("a/y.{ending}")), p.read(&format!("b/x.{ending}")), "{name} of its .pm");
-        let base = p.done(&format!("extract in.pm base.ply --camera cam.json --tau inf --json -q")).json();
+        p.done(&format!("extract in.pm c/x.{ending} --camera cam.json --tau 0 --cull none -q"));
+        let same = p.read(&format!("c/x.{ending}")) == p.read(&format!("b/x.{ending}"));
+        assert!(same, "{name} of its .pm");
+        let base = p.done("extract in.pm base.ply --camera cam.json --tau inf --json -q").json();
         let decoded = p.done("decode in.pm base2.ply --level 0 --json -q").json();
         assert_eq!((&base["faces"], &base["tau"]), (&decoded["triangles"], &Value::Null));
     }
@@ -41,7 +44,6 @@ fn one_view_takes_fewer_faces_than_all_of_it_and_a_budget_is_kept() {
     let faces = |flags: &str| {
         let r = p.done(&format!("extract in.pm out.ply --camera cam.json --json -q {flags}")).json();
         assert_eq!(p.info("out.ply")["triangles"]["file"], r["faces"], "{flags}");
-        assert!(p.info("out.ply")["problems"].is_object() || p.info("out.ply").is_object());
         r["faces"].as_u64().unwrap()
     };
     let (none, all) = (faces("--tau 2 --cull none"), faces("--tau 2"));
@@ -56,7 +58,7 @@ fn one_view_takes_fewer_faces_than_all_of_it_and_a_budget_is_kept() {
     // The same from the mesh itself, for any number of threads.
     p.done("extract in.ply a.ply --camera cam.json --threads 1 -q");
     p.done("extract in.ply b.ply --camera cam.json --threads 3 -q --png shot.png");
-    assert_eq!(p.read("a.ply"), p.read("b.ply"));
+    assert!(p.read("a.ply") == p.read("b.ply"));
     assert_eq!(&p.read("shot.png")[1..4], b"PNG");
 }
 
@@ -95,7 +97,9 @@ fn a_flight_reports_every_frame_and_what_is_shown_is_within_the_tolerance() {
     let p = Place::new();
     p.generate("scan", "in.ply", 8000);
     p.done("encode in.ply in.pm -q");
-    let r = p.done("fly in.pm --path circle --frames 40 --tau 1.5 --measure-every 8 --samples 20000 --json -q").json();
+    let r = p
+        .done("fly in.pm --path circle --frames 40 --tau 1.5 --measure-every 8 --samples 20000 --json -q")
+        .json();
     let frames = r["frames"].as_array().unwrap();
     assert_eq!((frames.len(), r["frame_count"].as_u64()), (40, Some(40)));
     let number = |f: &Value, k: &str| f[k].as_f64().unwrap();
@@ -106,8 +110,7 @@ fn a_flight_reports_every_frame_and_what_is_shown_is_within_the_tolerance() {
         assert!(number(&w[1], "visible_vertices") <= number(&w[1], "vertices"));
         assert!(w[1]["complete"].as_bool().unwrap());
     }
-    let measured: Vec<f64> =
-        frames.iter().filter_map(|f| f["measured"]["max_pixels"].as_f64()).collect();
+    let measured: Vec<f64> = frames.iter().filter_map(|f| f["measured"]["max_pixels"].as_f64()).collect();
     assert_eq!(measured.len(), 5);
     assert!(measured.iter().all(|&m| m <= 1.5 && m > 0.3), "{measured:?}");
     assert_eq!(r["above"], 0);
@@ -119,9 +122,15 @@ fn a_flight_reports_every_frame_and_what_is_shown_is_within_the_tolerance() {
     assert!(frames.iter().skip(30).any(|f| number(f, "faces") > 600.0));
     // Time: a frame that is cut short goes on in the next.
     let r = p.done("fly in.pm --path circle --frames 12 --budget-us 1 --json -q").json();
-    assert!(r["frames"].as_array().unwrap().iter().all(|f| number(f, "vsplits") + number(f, "ecols") <= 128.0));
+    assert!(
+        r["frames"].as_array().unwrap().iter().all(|f| number(f, "vsplits") + number(f, "ecols") <= 128.0)
+    );
     // For people, and pictures.
     let run = p.done("fly in.pm --path circle --frames 3 --png-every 2 --png-to shots");
     assert!(run.stderr.contains("vertex splits") && run.stdout.is_empty(), "{}", run.stderr);
-    assert!(p.exists("shots/frame00000.png") && p.exists("shots/frame00002.png") && !p.exists("shots/frame00001.png"));
+    assert!(
+        p.exists("shots/frame00000.png")
+            && p.exists("shots/frame00002.png")
+            && !p.exists("shots/frame00001.png")
+    );
 }

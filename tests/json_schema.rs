@@ -534,6 +534,132 @@ struct Morph {
     warnings: Vec<String>,
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Extract {
+    command: String,
+    to: String,
+    #[serde(deserialize_with = "present")]
+    tau: Option<f64>,
+    faces: usize,
+    vertices: usize,
+    splits: usize,
+    full_faces: usize,
+    full_splits: usize,
+    visible_vertices: usize,
+    seconds: ExtractSeconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ExtractSeconds {
+    read: f64,
+    bounds: f64,
+    refine: f64,
+    write: f64,
+    total: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Fly {
+    command: String,
+    path: String,
+    #[serde(deserialize_with = "present")]
+    tau: Option<f64>,
+    full_faces: usize,
+    frame_count: usize,
+    faces: FlyStatistics,
+    vsplits: FlyStatistics,
+    ecols: FlyStatistics,
+    us: FlyStatistics,
+    dirty_index_bytes: FlyStatistics,
+    #[serde(deserialize_with = "present")]
+    operations_per_second: Option<f64>,
+    #[serde(deserialize_with = "present")]
+    measured_over_tau: Option<FlyStatistics>,
+    above: usize,
+    memory: FlyMemory,
+    frames: Vec<FlyFrame>,
+    seconds: FlySeconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlyStatistics {
+    mean: f64,
+    p50: f64,
+    p99: f64,
+    max: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlyMemory {
+    shared_bytes: usize,
+    shared_bytes_per_vertex: f64,
+    view_bytes: usize,
+    view_table_bytes: usize,
+    most_vertices: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlyFrame {
+    faces: usize,
+    vertices: usize,
+    vsplits: usize,
+    ecols: usize,
+    us: f64,
+    #[serde(deserialize_with = "present")]
+    tau: Option<f64>,
+    complete: bool,
+    visible_vertices: usize,
+    dirty_index_bytes: usize,
+    dirty_wedges: usize,
+    #[serde(deserialize_with = "present")]
+    measured: Option<FlyMeasured>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlyMeasured {
+    samples: usize,
+    max_pixels: f64,
+    mean_pixels: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlySeconds {
+    read: f64,
+    bounds: f64,
+}
+
+#[test]
+fn selective_commands_print_one_object_with_the_documented_fields() {
+    let p = Place::new();
+    p.generate("torus", "in.obj", 600);
+    p.write(
+        "cam.json",
+        r#"{"eye": [0, 1, 6], "target": [0, 0, 0], "up": [0, 1, 0], "fov_y_deg": 45, "width": 640, "height": 480,
+            "near": 0.1, "far": 100}"#,
+    );
+    let of = |arguments: &str| p.done(arguments).stdout;
+    let e: Extract =
+        serde_json::from_str(&of("extract in.obj out.ply --camera cam.json --tau 2 --json")).unwrap();
+    assert_eq!((e.command.as_str(), e.to.as_str(), e.tau), ("extract", "ply", Some(2.0)));
+    assert!(e.faces <= e.full_faces && e.splits <= e.full_splits && e.visible_vertices <= e.vertices);
+    let f: Fly = serde_json::from_str(&of(
+        "fly in.obj --path circle --frames 4 --measure-every 2 --samples 500 --json",
+    ))
+    .unwrap();
+    assert_eq!((f.command.as_str(), f.frame_count, f.frames.len(), f.above), ("fly", 4, 4, 0));
+    assert!(f.frames[2].measured.as_ref().is_some_and(|m| m.samples > 100) && f.frames[1].measured.is_none());
+}
+
 #[test]
 fn progressive_commands_print_one_object_with_the_documented_fields() {
     let p = Place::new();
