@@ -9,6 +9,7 @@
 //! threads; damage is an error that names the chunk, never a panic, and takes memory in proportion to the bytes that are there. Not guaranteed: that a
 //! file whose checksums are right leads through its splits without [`crate::progressive::Damage`]; cursors find that.
 
+mod assembly;
 mod base;
 mod coder;
 mod connect;
@@ -16,6 +17,7 @@ mod container;
 mod extras;
 mod input_order;
 mod lattice;
+mod models;
 mod places;
 mod plan;
 mod read;
@@ -26,13 +28,12 @@ mod splits;
 mod walk;
 mod write;
 
+pub use assembly::{Assembly, Decoded, Report, StreamSizes};
 pub use base::MeshHead;
 pub use container::{Chunk, ChunkType, Directory, FormatError, MAGIC, VERSION};
 pub use lattice::suggested_grid;
 pub use places::Lattice;
-pub use read::{
-    Assembly, ByteRanges, Decoded, Piece, PmReader, RangeReader, Report, StreamSizes, decode, decode_prefix,
-};
+pub use read::{ByteRanges, Piece, PmReader, RangeReader, decode, decode_prefix};
 pub use splits::SplitBlock;
 pub use write::{EncodeError, EncodeOptions, encode};
 

@@ -3,45 +3,11 @@
 //! One description of every stream serves both directions: code that is generic over [`Coder`] writes with an [`Encoder`], which returns what
 //! it is given, and reads with a [`Decoder`], which ignores what it is given. So the two cannot drift apart.
 //!
-//! Own code, where zstd is at hand: chunks are decodable alone, so each is small (some 10 KB a stream), and most of its symbols are worth a
+//! Own code, where zstd is at hand: chunks are small (some 10 KB a stream), and most of their symbols are worth a
 //! fraction of a bit in their context (whether a vertex waits, which way a face runs), which a coder of bytes cannot know.
 
-/// Bits of precision of a probability.
-const PRECISION: u32 = 15;
-/// All shares together.
-const TOTAL: u32 = 1 << PRECISION;
-
-/// How probable it is that the next bit is 0, as two estimates, one that learns fast and one that learns slowly; their mean counts.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bit {
-    fast: u16,
-    slow: u16,
-}
-
-impl Default for Bit {
-    fn default() -> Self {
-        Bit { fast: 1 << (PRECISION - 1), slow: 1 << (PRECISION - 1) }
-    }
-}
-
-impl Bit {
-    /// Never 0 nor 1: the estimates stay below 1 by what a shift rounds off.
-    #[inline]
-    fn zero(self) -> u32 {
-        ((self.fast as u32 + self.slow as u32) >> 1).clamp(32, (1 << PRECISION) - 32)
-    }
-
-    #[inline]
-    fn learn(&mut self, bit: bool) {
-        if bit {
-            self.fast -= self.fast >> 4;
-            self.slow -= self.slow >> 7;
-        } else {
-            self.fast += ((1 << PRECISION) - self.fast) >> 4;
-            self.slow += ((1 << PRECISION) - self.slow) >> 7;
-        }
-    }
-}
+pub(super) use super::models::{Bit, Nibble, Number};
+use super::models::{PRECISION, TOTAL};
 
 /// Writes or reads one stream.
 pub(super) trait Coder {
@@ -129,64 +95,6 @@ pub(super) fn zigzag(x: i64) -> u64 {
 pub(super) fn unzigzag(x: u64) -> i64 {
     (x >> 1) as i64 ^ -((x & 1) as i64)
 }
-
-/// What is known about numbers of a kind.
-#[derive(Clone, Debug)]
-pub(super) struct Number {
-    bits: [Nibble; 5],
-    second: [Bit; 65],
-}
-
-impl Default for Number {
-    fn default() -> Self {
-        Number { bits: Default::default(), second: [Bit::default(); 65] }
-    }
-}
-
-/// An adaptive symbol of 16: where the share of each begins, of [`TOTAL`].
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Nibble {
-    start: [i16; 16],
-    seen: u8,
-}
-
-impl Default for Nibble {
-    fn default() -> Self {
-        Nibble { start: std::array::from_fn(|i| (i as i16) << (PRECISION - 4)), seen: 0 }
-    }
-}
-
-impl Nibble {
-    /// Start and size of the share of `symbol`.
-    #[inline]
-    fn share(&self, symbol: usize) -> (u32, u32) {
-        let start = self.start[symbol & 15] as u32;
-        let end = if symbol >= 15 { TOTAL } else { self.start[symbol + 1] as u32 };
-        (start, end - start)
-    }
-
-    /// The symbol in whose share `slot` lies.
-    #[inline]
-    fn find(&self, slot: u32) -> usize {
-        let slot = slot as i16;
-        let below: i16 = self.start.iter().map(|&s| (s <= slot) as i16).sum();
-        below as usize - 1
-    }
-
-    /// Every start moves towards where it were if only `symbol` came and all others kept a share of 1; fast at first.
-    #[inline]
-    fn learn(&mut self, symbol: usize) {
-        let rate = RATES[(self.seen >> 3) as usize];
-        self.seen += (self.seen < 8 * RATES.len() as u8 - 1) as u8;
-        for (i, s) in self.start.iter_mut().enumerate().skip(1) {
-            let goal = if i > symbol { (TOTAL - 16) as i16 + i as i16 } else { i as i16 };
-            *s += (goal - *s) >> rate;
-        }
-    }
-}
-
-/// How slowly a [`Nibble`] learns, by how many eights of symbols it has seen.
-const RATES: [u8; 16] = [3, 4, 4, 5, 5, 5, 5, 6, 6, 6, 6, 6, 6, 6, 6, 7];
 
 /// Writes by range asymmetric numeral systems (Duda 2013): decisions are kept as they come, and coded backwards at the end.
 #[derive(Clone, Debug, Default)]

@@ -1,0 +1,230 @@
+//! Meshes put together from the chunks of a file, and what was found on the way.
+
+use super::base::MeshHead;
+use super::container::{Chunk, ChunkType, Directory, FormatError};
+use super::input_order;
+use super::read::Piece;
+use super::sequel::{self, Sequel};
+use super::splits::{self, SplitBlock};
+use crate::progressive::{InputOrder, ProgressiveMesh};
+
+/// Meshes in the making: what the chunks so far make of them.
+#[derive(Clone, Debug, Default)]
+pub struct Assembly {
+    meshes: Vec<Option<Part>>,
+    turns: Vec<u32>,
+    pub(super) scene: Option<Vec<u8>>,
+}
+
+#[derive(Clone, Debug)]
+struct Part {
+    head: MeshHead,
+    mesh: ProgressiveMesh,
+    faces: usize,
+    wedges: usize,
+    /// Once splits were read with it.
+    sequel: Option<Sequel>,
+    /// Damage has ended it.
+    void: bool,
+}
+
+impl Part {
+    /// Appends splits; false (and nothing done) if they do not follow those that are there.
+    fn append(&mut self, block: &SplitBlock) -> bool {
+        let follows = block.first_face as usize == self.faces
+            && (self.mesh.wedges.is_none() || block.first_wedge as usize == self.wedges)
+            && self.mesh.splits.len() + block.splits.len() <= self.head.splits as usize
+            && block.append_to(&mut self.mesh);
+        if follows {
+            self.faces += block.faces();
+            self.wedges += block.new_wedges();
+        }
+        follows
+    }
+
+    /// The splits of a chunk that is read with the mesh.
+    fn sequel(&mut self, chunk: &Chunk, bytes: &[u8]) -> Option<SplitBlock> {
+        if self.sequel.is_none() && !self.mesh.splits.is_empty() {
+            // Splits that were read alone came before.
+            return None;
+        }
+        let state = match &mut self.sequel {
+            Some(state) => state,
+            none => none.insert(Sequel::new(&self.head, &self.mesh)?),
+        };
+        let at = (chunk.first, chunk.first_face);
+        sequel::read(&self.head, state, at, chunk.count as usize, chunk.raw, bytes)
+    }
+}
+
+impl Assembly {
+    /// Nothing yet of the meshes of a file.
+    pub fn new(directory: &Directory) -> Self {
+        Assembly { meshes: vec![None; directory.meshes as usize], ..Default::default() }
+    }
+
+    /// The head of mesh `m`, once its base was added.
+    pub fn head(&self, m: u32) -> Option<&MeshHead> {
+        self.meshes.get(m as usize)?.as_ref().map(|p| &p.head)
+    }
+
+    /// Mesh `m` so far, once its base was added.
+    pub fn mesh(&self, m: u32) -> Option<&ProgressiveMesh> {
+        self.meshes.get(m as usize)?.as_ref().map(|p| &p.mesh)
+    }
+
+    /// Adds what a chunk held. Chunks of a mesh must come in their order.
+    ///
+    /// Errors: what does not follow what came before. The meshes are unchanged then.
+    pub fn add(&mut self, chunk: &Chunk, piece: Piece) -> Result<(), FormatError> {
+        let part = self.meshes.get_mut(chunk.mesh as usize);
+        match (piece, part) {
+            (Piece::Base(both), Some(part @ None)) => {
+                let (head, mesh) = *both;
+                let (faces, wedges) = (head.base_faces as usize, head.base_wedges as usize);
+                *part = Some(Part { head, mesh, faces, wedges, sequel: None, void: false });
+            }
+            (Piece::Splits(block), Some(Some(part))) => {
+                if part.sequel.is_some() || !part.append(&block) {
+                    return Err(chunk.damage("its splits do not follow those before"));
+                }
+                self.turns.extend(std::iter::repeat_n(chunk.mesh, block.splits.len()));
+            }
+            (Piece::Sequel(bytes), Some(Some(part))) if !part.void => {
+                let block = part.sequel(chunk, &bytes);
+                match block.filter(|b| part.append(b)) {
+                    Some(block) => self.turns.extend(std::iter::repeat_n(chunk.mesh, block.splits.len())),
+                    None => {
+                        part.void = true;
+                        return Err(chunk.damage("its contents contradict each other, or what came before"));
+                    }
+                }
+            }
+            (Piece::Order(bytes), Some(Some(part))) if part.mesh.order.is_none() => {
+                if part.mesh.splits.len() < part.head.splits as usize {
+                    return Err(chunk.damage("it comes before the last split of its mesh"));
+                }
+                let read = input_order::read(&part.mesh, &bytes, chunk.raw);
+                let (order, tips): (InputOrder, _) =
+                    read.ok_or_else(|| chunk.damage("its contents contradict each other"))?;
+                part.mesh.order = Some(order);
+                input_order::turn(&mut part.mesh, &tips, false);
+            }
+            (Piece::Scene(bytes), _) if self.scene.is_none() => self.scene = Some(bytes),
+            (Piece::Other(_), _) => {}
+            _ => return Err(chunk.damage("it does not follow what came before")),
+        }
+        Ok(())
+    }
+
+    /// The meshes as they are, and what is known of their levels.
+    pub(super) fn finish(self, directory: &Directory, damage: Option<FormatError>) -> Decoded {
+        let mut report = Report { complete: damage.is_none(), ..Default::default() };
+        report.streams.head = directory.bytes();
+        let mut meshes = Vec::new();
+        for part in self.meshes.into_iter().flatten() {
+            let mut pm = part.mesh;
+            let n = pm.splits.len() as u32;
+            pm.levels = part.head.levels.iter().copied().filter(|&l| l < n).chain([n]).collect();
+            report.quantisation_errors.push(part.head.quantisation_error);
+            report.flat_faces.push(part.head.flat_faces);
+            report.complete &= n == part.head.splits;
+            meshes.push(pm);
+        }
+        report.damage = damage;
+        Decoded { meshes, turns: self.turns, scene: self.scene, report }
+    }
+}
+
+/// What a file held.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Decoded {
+    /// The meshes. Of a damaged or cut off file, as much of them as came before the damage.
+    pub meshes: Vec<ProgressiveMesh>,
+    /// The mesh whose next split comes, coarsest first.
+    pub turns: Vec<u32>,
+    /// The scene, as it was given to [`super::encode`].
+    pub scene: Option<Vec<u8>>,
+    /// Sizes and losses.
+    pub report: Report,
+}
+
+/// What was found while reading.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Report {
+    /// Every split of every mesh was there.
+    pub complete: bool,
+    /// What ended the reading before the end of the file.
+    pub damage: Option<FormatError>,
+    /// By mesh: how far quantising moved a vertex at most, model units; 0 for none.
+    pub quantisation_errors: Vec<f64>,
+    /// By mesh: faces at full detail of which quantising put two corners at one place.
+    pub flat_faces: Vec<u32>,
+    /// Bytes in the file.
+    pub streams: StreamSizes,
+}
+
+/// Bytes in a file by what they are for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct StreamSizes {
+    /// Head and directory.
+    pub head: u64,
+    /// Bases.
+    pub base: u64,
+    /// References and codes of splits.
+    pub connectivity: u64,
+    /// Errors of splits.
+    pub errors: u64,
+    /// Positions of splits.
+    pub places: u64,
+    /// Attributes of splits.
+    pub attributes: u64,
+    /// Materials and groups of the faces of splits.
+    pub faces: u64,
+    /// The input's order.
+    pub order: u64,
+    /// The scene.
+    pub scene: u64,
+    /// All else.
+    pub other: u64,
+    /// Chunks of splits.
+    pub chunks: u64,
+}
+
+impl StreamSizes {
+    pub(super) fn add(&mut self, chunk: &Chunk, bytes: &[u8]) {
+        match chunk.kind {
+            ChunkType::BASE => self.base += chunk.stored,
+            ChunkType::ORDER => self.order += chunk.stored,
+            ChunkType::SCENE => self.scene += chunk.stored,
+            ChunkType::SPLITS | ChunkType::SEQUEL => {
+                let [c, e, p, a, f] = splits::sizes(bytes).unwrap_or_default();
+                self.connectivity += c;
+                self.errors += e;
+                self.places += p;
+                self.attributes += a;
+                self.faces += f;
+                self.other += chunk.stored.saturating_sub(c + e + p + a + f);
+                self.chunks += 1;
+            }
+            _ => self.other += chunk.stored,
+        }
+    }
+
+    /// All of them together: the size of the file.
+    pub fn total(&self) -> u64 {
+        self.head
+            + self.base
+            + self.connectivity
+            + self.errors
+            + self.places
+            + self.attributes
+            + self.faces
+            + self.order
+            + self.scene
+            + self.other
+    }
+}
