@@ -140,24 +140,57 @@ impl Farthest {
     }
 }
 
+/// Samples of a row looked at together.
+const LANES: usize = 8;
+
+/// Below this doubled area heights of 24 bits give sums and products of 52, which f64 holds exactly.
+const EXACT_IN_F64: i64 = 1 << 28;
+
 /// Looks at every sample of a triangle that turns to the left and has no void sample.
 #[inline]
 pub(super) fn farthest(field: &Field, a: Corner, b: Corner, c: Corner) -> Farthest {
     let plane = Plane::new(a, b, c);
     let (mut miss, mut sample) = (0, 0u32);
     let columns = field.columns as usize;
+    let vectors = plane.area < EXACT_IN_F64;
+    let area = plane.area as f64;
+    let steps: [f64; LANES] = std::array::from_fn(|i| (i as i64 * plane.dx) as f64);
     rows((a.x, a.y), (b.x, b.y), (c.x, c.y), |y, x0, x1| {
         let mut s = plane.at + plane.dx * i64::from(x0 - a.x) + plane.dy * i64::from(y - a.y);
-        let first = y as usize * columns + x0 as usize;
+        let mut first = y as usize * columns + x0 as usize;
         let row = &field.h[first..=first + (x1 - x0) as usize];
-        for (i, &h) in row.iter().enumerate() {
-            let e = (s - plane.area * i64::from(h)).abs();
-            if e > miss {
-                miss = e;
-                sample = (first + i) as u32;
+        let mut one_by_one = |s: i64, first: usize, part: &[i32]| {
+            let mut s = s;
+            for (i, &h) in part.iter().enumerate() {
+                let e = (s - plane.area * i64::from(h)).abs();
+                if e > miss {
+                    miss = e;
+                    sample = (first + i) as u32;
+                }
+                s += plane.dx;
             }
-            s += plane.dx;
+            miss
+        };
+        if !vectors || row.len() < LANES {
+            one_by_one(s, first, row);
+            return;
         }
+        // In f64, without rounding; which of the eight it is only where one is farther than all before.
+        let (chunks, rest) = row.as_chunks::<LANES>();
+        let mut known = one_by_one(s, first, &[]) as f64;
+        for chunk in chunks {
+            let start = s as f64;
+            let e: [f64; LANES] =
+                std::array::from_fn(|i| (start + steps[i] - area * f64::from(chunk[i])).abs());
+            let larger = |a: f64, b: f64| if a > b { a } else { b };
+            let four: [f64; 4] = std::array::from_fn(|i| larger(e[i], e[i + 4]));
+            if larger(larger(four[0], four[2]), larger(four[1], four[3])) > known {
+                known = one_by_one(s, first, chunk) as f64;
+            }
+            s += plane.dx * LANES as i64;
+            first += LANES;
+        }
+        one_by_one(s, first, rest);
     });
     Farthest { miss, sample, area: plane.area }
 }
@@ -232,6 +265,32 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(300))]
+        /// Eight at a time or one, the farthest sample is the same.
+        #[test]
+        fn the_farthest_is_the_farthest(
+            heights in proptest::collection::vec(-(1 << 24)..1i32 << 24, 40 * 6),
+            z in proptest::array::uniform3(-(1 << 24)..1i32 << 24),
+        ) {
+            let grid = crate::Grid::new(40, 6, heights.iter().map(|&h| f64::from(h)).collect()).unwrap();
+            let field = Field { h: heights.clone(), ..Field::new(&grid, 0.0) };
+            let [a, b, c] = [(0, 0), (39, 1), (3, 5)];
+            let corner = |(x, y), z| Corner { x, y, z };
+            let far = farthest(&field, corner(a, z[0]), corner(b, z[1]), corner(c, z[2]));
+            let mut most = (0, 0);
+            for (i, &h) in heights.iter().enumerate() {
+                let p = ((i % 40) as i32, (i / 40) as i32);
+                let w = [area(b, c, p), area(c, a, p), area(a, b, p)];
+                if w.iter().all(|&w| w >= 0) {
+                    let s: i64 = (0..3).map(|k| w[k] * i64::from(z[k])).sum();
+                    let miss = (s - far.area * i64::from(h)).abs();
+                    if miss > most.0 {
+                        most = (miss, i as u32);
+                    }
+                }
+            }
+            prop_assert_eq!((far.miss, far.sample), most);
+        }
+
         /// Rows are the lattice points that three half planes hold.
         #[test]
         fn rows_hold_every_sample(p in proptest::array::uniform6(0..13i32)) {
