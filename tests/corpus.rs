@@ -45,9 +45,8 @@ fn every_file_and_every_truncation_is_survived() {
 fn try_grid(bytes: &[u8], name: &str) -> bool {
     let mut good = false;
     for format in [None, Some(GridFormat::Hgt), Some(GridFormat::Ascii), Some(GridFormat::Raw)] {
-        let mut options = GridOptions::default();
-        (options.format, options.cache) = (format, 4096);
-        (options.size, options.sample) = (None, None);
+        let mut options = GridOptions::default().with_cache(4096);
+        options.format = format;
         if format == Some(GridFormat::Raw) {
             (options.size, options.sample) =
                 (Some([bytes.len().max(1), 1]), Some((SampleType::U8, ByteOrder::Big)));

@@ -130,8 +130,7 @@ fn windows_are_parts_of_the_whole_whatever_the_cache() {
     ] {
         let bytes = made.bytes();
         for cache in [0, 3000, 1 << 20] {
-            let mut options = GridOptions::default();
-            options.cache = cache;
+            let options = GridOptions::default().with_cache(cache);
             let file = read_with(&bytes, "a.tif", &options).unwrap();
             for (x, y, w, h) in
                 [(0, 0, 61, 47), (15, 15, 2, 2), (60, 46, 1, 1), (7, 30, 40, 17), (0, 46, 61, 1)]
@@ -337,8 +336,7 @@ fn rows_of_a_picture_come_in_any_order() {
     let want: Vec<f64> = (0..3000 * 900).map(|i| f64::from(i as u32 % 64_007)).collect();
     let grid = Grid::new(3000, 900, want).unwrap();
     let bytes = written(GridFormat::Png, &grid, &Georeference::default()).unwrap();
-    let mut options = GridOptions::default();
-    options.cache = 0;
+    let options = GridOptions::default().with_cache(0);
     let file = read_with(&bytes, "a.png", &options).unwrap();
     for row in [899, 0, 500, 340, 360, 899] {
         let window = Window::new(2990, row, 10, 1);
@@ -511,8 +509,7 @@ fn several_threads_read_at_once() {
     let want = heights(SampleType::I16, 200, 200);
     let made =
         Made { tile: Some(32), packing: Packing::Deflate, ..Made::new(SampleType::I16, 200, 200, &want) };
-    let mut options = GridOptions::default();
-    options.cache = 50_000;
+    let options = GridOptions::default().with_cache(50_000);
     let file = read_with(&made.bytes(), "a.tif", &options).unwrap();
     std::thread::scope(|s| {
         for start in 0..4usize {
@@ -530,7 +527,7 @@ fn several_threads_read_at_once() {
 #[test]
 fn unpacked_bytes_are_those_that_were_packed() {
     // The test's own packers, so that a fault of theirs is not one of the reader's.
-    let bytes: Vec<u8> = (0..5000u32).map(|i| (i * i >> 3) as u8).collect();
+    let bytes: Vec<u8> = (0..5000u32).map(|i| ((i * i) >> 3) as u8).collect();
     let mut out = vec![];
     flate2::read::ZlibDecoder::new(&Packing::Deflate.pack(&bytes)[..]).read_to_end(&mut out).unwrap();
     assert_eq!(out, bytes);

@@ -8,8 +8,7 @@ use progmesh::terrain::Window;
 use std::sync::Arc;
 
 fuzz_target!(|bytes: &[u8]| {
-    let mut options = GridOptions::default();
-    options.cache = 1 << 16;
+    let mut options = GridOptions::default().with_cache(1 << 16);
     if GridFormat::from_bytes(bytes).is_none() {
         options.format = Some(match bytes.first().map_or(0, |b| b % 3) {
             0 => GridFormat::Hgt,

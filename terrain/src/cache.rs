@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A cache of blocks of heights with a limit in bytes; the one unused for longest goes first. Shared by threads.
+/// A cache of blocks of heights with a limit in bytes; the one unused for longest goes first. Shared by threads, and by any number of
+/// rasters, each of which takes an [`owner`](BlockCache::owner) of its own.
 ///
-/// The limit is kept except by a single block larger than it, which is not kept at all. Two threads that miss the same block both make
+/// The limit is kept, except by a single block larger than it, which is kept alone. Two threads that miss the same block both make
 /// it: nothing waits for another's work.
 #[derive(Debug)]
 pub struct BlockCache {
@@ -15,7 +16,9 @@ pub struct BlockCache {
 
 #[derive(Debug, Default)]
 struct State {
-    blocks: HashMap<usize, (Arc<[f64]>, u64)>,
+    /// By owner and number, with the time of the last use.
+    blocks: HashMap<(usize, usize), (Arc<[f64]>, u64)>,
+    owners: usize,
     bytes: usize,
     clock: u64,
 }
@@ -27,11 +30,22 @@ impl BlockCache {
         BlockCache { limit, state: Mutex::default() }
     }
 
-    /// The block of this number: a kept one, or what `make` gives.
+    /// A number that tells the blocks of one raster from those of others.
+    pub fn owner(&self) -> usize {
+        let state = &mut *self.lock();
+        state.owners += 1;
+        state.owners
+    }
+
+    /// The block of this owner and number: a kept one, or what `make` gives.
     ///
     /// # Errors
     /// Those of `make`; nothing is kept then.
-    pub fn get<E>(&self, block: usize, make: impl FnOnce() -> Result<Vec<f64>, E>) -> Result<Arc<[f64]>, E> {
+    pub fn get<E>(
+        &self,
+        block: (usize, usize),
+        make: impl FnOnce() -> Result<Vec<f64>, E>,
+    ) -> Result<Arc<[f64]>, E> {
         if let Some(found) = self.find(block) {
             return Ok(found);
         }
@@ -51,7 +65,7 @@ impl BlockCache {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn find(&self, block: usize) -> Option<Arc<[f64]>> {
+    fn find(&self, block: (usize, usize)) -> Option<Arc<[f64]>> {
         let state = &mut *self.lock();
         state.clock += 1;
         let entry = state.blocks.get_mut(&block)?;
@@ -59,11 +73,8 @@ impl BlockCache {
         Some(entry.0.clone())
     }
 
-    fn keep(&self, block: usize, made: &Arc<[f64]>) {
+    fn keep(&self, block: (usize, usize), made: &Arc<[f64]>) {
         let size = std::mem::size_of_val::<[f64]>(made);
-        if size > self.limit {
-            return;
-        }
         let state = &mut *self.lock();
         while state.bytes + size > self.limit {
             // Blocks are large, so there are few: a scan costs little beside decoding one.
@@ -89,7 +100,7 @@ mod tests {
             *made += 1;
             Ok::<_, ()>(vec![n as f64; 4])
         };
-        cache.get(n, make).unwrap()
+        cache.get((0, n), make).unwrap()
     }
 
     #[test]
@@ -104,14 +115,24 @@ mod tests {
     }
 
     #[test]
-    fn a_block_beyond_the_limit_is_not_kept_and_errors_are_not_either() {
+    fn a_block_beyond_the_limit_is_kept_alone_and_errors_are_not() {
         let (cache, mut made) = (BlockCache::new(8), 0);
-        block(&cache, 0, &mut made);
-        block(&cache, 0, &mut made);
-        assert_eq!((made, cache.bytes()), (2, 0));
+        for n in [0, 0, 1, 1, 0] {
+            block(&cache, n, &mut made);
+            assert_eq!(cache.bytes(), 32);
+        }
         let cache = BlockCache::new(64);
-        assert_eq!(cache.get(0, || Err("no")), Err::<Arc<[f64]>, _>("no"));
+        assert_eq!(cache.get((0, 0), || Err("no")), Err::<Arc<[f64]>, _>("no"));
         block(&cache, 0, &mut made);
-        assert_eq!(made, 3);
+        assert_eq!(made, 4);
+    }
+
+    #[test]
+    fn owners_share_the_limit_and_not_their_blocks() {
+        let cache = BlockCache::new(64);
+        let (a, b) = (cache.owner(), cache.owner());
+        let get = |owner, h: f64| cache.get((owner, 0), || Ok::<_, ()>(vec![h; 4])).unwrap()[0];
+        assert_eq!([get(a, 1.0), get(b, 2.0), get(a, 3.0), get(b, 3.0)], [1.0, 2.0, 1.0, 2.0]);
+        assert_eq!(cache.bytes(), 64);
     }
 }

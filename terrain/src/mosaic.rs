@@ -283,3 +283,51 @@ mod tests {
         assert_eq!(error(vec![]), "a mosaic needs at least one grid");
     }
 }
+
+#[cfg(test)]
+mod random {
+    use super::*;
+    use crate::Grid;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Windows of a mosaic against the parts painted, the last first, onto one sheet.
+        #[test]
+        fn windows_are_those_of_the_parts_painted(
+            places in prop::collection::vec((-4i32..5, -4i32..5, 1usize..5, 1usize..5), 1..5),
+            corner in (0.0..1.0f64, 0.0..1.0f64, 0.0..1.0f64, 0.0..1.0f64),
+        ) {
+            let height = |part: usize, i: usize| if i % 3 == 2 { f64::NAN } else { (100 * part + i) as f64 };
+            let part = |(n, &(x, y, w, h)): (usize, &(i32, i32, usize, usize))| Part {
+                name: format!("{n}"),
+                raster: Box::new(Grid::new(w, h, (0..w * h).map(|i| height(n, i)).collect()).unwrap()),
+                georeference: Georeference {
+                    transform: Some(Affine::north_up([0.1 * f64::from(x), -0.1 * f64::from(y)], [0.1; 2])),
+                    ..Default::default()
+                },
+            };
+            let (mosaic, place) = Mosaic::new(places.iter().enumerate().map(part).collect()).unwrap();
+            let left = places.iter().map(|p| p.0).min().unwrap();
+            let top = places.iter().map(|p| p.1).min().unwrap();
+            let (columns, rows) = (mosaic.columns(), mosaic.rows());
+            let mut sheet = vec![f64::NAN; columns * rows];
+            for (n, &(x, y, w, h)) in places.iter().enumerate().rev() {
+                for i in (0..w * h).filter(|&i| !height(n, i).is_nan()) {
+                    let (c, r) = ((x - left) as usize + i % w, (y - top) as usize + i / w);
+                    sheet[r * columns + c] = height(n, i);
+                }
+            }
+            let first = place.transform.unwrap().apply([0.0, 0.0]);
+            prop_assert!((first[0] - 0.1 * f64::from(left)).abs() < 1e-9);
+            let sheet = Grid::new(columns, rows, sheet).unwrap();
+            let pick = |share: f64, n: usize| ((share * n as f64) as usize).min(n - 1);
+            let (x, y) = (pick(corner.0, columns), pick(corner.1, rows));
+            let window = Window::new(x, y, 1 + pick(corner.2, columns - x), 1 + pick(corner.3, rows - y));
+            let (a, b) = (mosaic.window(window).unwrap(), sheet.window(window).unwrap());
+            let same = a.heights().iter().zip(b.heights()).all(|(a, b)| a == b || a.is_nan() && b.is_nan());
+            prop_assert!(same, "{window:?}: {:?} {:?}", a.heights(), b.heights());
+        }
+    }
+}

@@ -128,7 +128,7 @@ mod tests {
         ] {
             let mut count = vec![0; size[0] * size[1]];
             for w in windows(&Blocks(size, block), at_once) {
-                let fits = block[0] * block[1] <= at_once;
+                let fits = block[0].saturating_mul(block[1]) <= at_once;
                 assert!(w.columns * w.rows <= at_once);
                 assert!(!fits || w.column.is_multiple_of(block[0]) && w.row.is_multiple_of(block[1]));
                 for row in w.row..w.row + w.rows {

@@ -109,8 +109,8 @@ impl GridInput {
 
     /// Opens it: what it says about itself is read, and its heights when asked for.
     pub(crate) fn open(&self, warnings: &mut Warnings) -> Result<GridFile, Failure> {
-        let mut options = self.options();
-        options.cache /= self.grids.len().max(1);
+        // All files share the options' cache.
+        let options = self.options();
         let mut files = vec![];
         for path in &self.grids {
             let file = common::name(path, "standard input");

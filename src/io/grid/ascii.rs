@@ -23,7 +23,9 @@ pub(super) struct Ascii {
     band: usize,
     /// Where each band begins: byte and line.
     starts: Vec<(u64, usize)>,
-    cache: BlockCache,
+    cache: Arc<BlockCache>,
+    /// Whose blocks these are.
+    owner: usize,
 }
 
 /// Words of a text, with their places.
@@ -139,7 +141,7 @@ impl Head {
 /// Reads the head, and through all of the text once.
 pub(super) fn open(
     source: Arc<dyn ReadAt>,
-    cache: usize,
+    cache: &Arc<BlockCache>,
 ) -> Result<(Ascii, Georeference, Facts), DecodeError> {
     let mut words = Words::new(&source);
     let mut head = Head::default();
@@ -188,7 +190,11 @@ pub(super) fn open(
         warnings: vec![],
     };
     let georeference = head.georeference(rows);
-    Ok((Ascii { source, columns, rows, band, starts, cache: BlockCache::new(cache) }, georeference, facts))
+    Ok((
+        Ascii { source, columns, rows, band, starts, owner: cache.owner(), cache: cache.clone() },
+        georeference,
+        facts,
+    ))
 }
 
 impl Ascii {
@@ -230,7 +236,7 @@ impl Raster for Ascii {
             let band = row / self.band;
             let heights = match kept.take() {
                 Some((b, heights)) if b == band => heights,
-                _ => self.cache.get(band, || self.band_heights(band)).map_err(|e| match e {
+                _ => self.cache.get((self.owner, band), || self.band_heights(band)).map_err(|e| match e {
                     DecodeError::Line { line, what } => {
                         RasterError::Source { place: format!("line {line}"), what }
                     }
@@ -250,7 +256,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<(Ascii, Georeference, Facts), DecodeError> {
-        open(Arc::new(text.as_bytes().to_vec()), 1 << 20)
+        open(Arc::new(text.as_bytes().to_vec()), &Arc::new(BlockCache::new(1 << 20)))
     }
 
     const HEAD: &str = "ncols 3\nNROWS 2\nxllcorner 10\nyllcorner 20\ncellsize 2\n";

@@ -16,7 +16,7 @@ pub use samples::{ByteOrder, SampleType};
 pub use source::ReadAt;
 
 use super::DecodeError;
-use crate::terrain::{Georeference, Mosaic, MosaicError, Part, Raster};
+use crate::terrain::{BlockCache, Georeference, Mosaic, MosaicError, Part, Raster};
 use std::sync::Arc;
 
 /// A format of grids.
@@ -110,14 +110,23 @@ pub struct GridOptions {
     pub encoding: Option<Encoding>,
     /// The value that means no data, instead of the file's own.
     pub nodata: Option<f64>,
-    /// Bytes of decoded blocks to keep.
-    pub cache: usize,
+    /// Where decoded blocks are kept: one cache for all grids that are opened with (clones of) these options.
+    pub cache: Arc<BlockCache>,
 }
 
 impl Default for GridOptions {
     fn default() -> Self {
         // A row of tiles of 256 rows over 16,385 columns in f64, twice.
-        GridOptions { format: None, size: None, sample: None, encoding: None, nodata: None, cache: 64 << 20 }
+        let cache = Arc::new(BlockCache::new(64 << 20));
+        GridOptions { format: None, size: None, sample: None, encoding: None, nodata: None, cache }
+    }
+}
+
+impl GridOptions {
+    /// The same with an empty cache of at most this many bytes.
+    pub fn with_cache(mut self, bytes: usize) -> Self {
+        self.cache = Arc::new(BlockCache::new(bytes));
+        self
     }
 }
 
@@ -210,17 +219,17 @@ pub fn open(source: Arc<dyn ReadAt>, name: &str, options: &GridOptions) -> Resul
     let mut georeference = Georeference::default();
     let (raw, facts): (Box<dyn Raster>, Facts) = match format {
         GridFormat::Tiff => {
-            let (tiff, place, facts) = tiff::open(source, options.cache)?;
+            let (tiff, place, facts) = tiff::open(source, &options.cache)?;
             georeference = place;
             (Box::new(tiff), facts)
         }
         GridFormat::Ascii => {
-            let (ascii, place, facts) = ascii::open(source, options.cache)?;
+            let (ascii, place, facts) = ascii::open(source, &options.cache)?;
             georeference = place;
             (Box::new(ascii), facts)
         }
         GridFormat::Png => {
-            let (picture, facts) = png::open(source, options.encoding, options.cache)?;
+            let (picture, facts) = png::open(source, options.encoding, &options.cache)?;
             (Box::new(picture), facts)
         }
         GridFormat::Hgt => {

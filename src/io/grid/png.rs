@@ -24,7 +24,9 @@ pub(super) struct Picture {
     interlaced: bool,
     /// Rows of a band.
     band: usize,
-    cache: BlockCache,
+    cache: Arc<BlockCache>,
+    /// Whose blocks these are.
+    owner: usize,
     /// Where unpacking has got to, for whoever goes on from there.
     open: Mutex<Option<Unpacking>>,
 }
@@ -52,7 +54,7 @@ fn start(source: &Arc<dyn ReadAt>) -> Result<Unpacking, String> {
 pub(super) fn open(
     source: Arc<dyn ReadAt>,
     encoding: Option<Encoding>,
-    cache: usize,
+    cache: &Arc<BlockCache>,
 ) -> Result<(Picture, Facts), DecodeError> {
     let unpacking = start(&source).map_err(wrong)?;
     let info = unpacking.reader.info();
@@ -93,7 +95,8 @@ pub(super) fn open(
         encoding,
         interlaced,
         band: if interlaced { rows } else { (BAND / columns).clamp(1, rows) },
-        cache: BlockCache::new(cache),
+        owner: cache.owner(),
+        cache: cache.clone(),
         open: Mutex::new(Some(unpacking)),
     };
     if colored && !explicit {
@@ -212,7 +215,7 @@ impl Raster for Picture {
             let band = row / self.band;
             let heights = match kept.take() {
                 Some((b, heights)) if b == band => heights,
-                _ => self.cache.get(band, || self.band_heights(band))?,
+                _ => self.cache.get((self.owner, band), || self.band_heights(band))?,
             };
             let from = (row - band * self.band) * self.columns + window.column;
             line.copy_from_slice(&heights[from..from + window.columns]);

@@ -20,13 +20,15 @@ use std::sync::Arc;
 pub(super) struct Tiff {
     source: Arc<dyn ReadAt>,
     layout: Layout,
-    cache: BlockCache,
+    cache: Arc<BlockCache>,
+    /// Whose blocks these are.
+    owner: usize,
 }
 
-/// Opens the first image. What is decoded later is kept up to `cache` bytes.
+/// Opens the first image. What is decoded later is kept in `cache`.
 pub(super) fn open(
     source: Arc<dyn ReadAt>,
-    cache: usize,
+    cache: &Arc<BlockCache>,
 ) -> Result<(Tiff, Georeference, Facts), DecodeError> {
     let directory = Directory::read(&*source)?;
     let layout = Layout::of(&directory, &*source)?;
@@ -50,7 +52,7 @@ pub(super) fn open(
         },
     };
     let facts = Facts { sample: layout.sample, layout: layout.about(directory.big), nodata, warnings };
-    Ok((Tiff { source, layout, cache: BlockCache::new(cache) }, georeference, facts))
+    Ok((Tiff { source, layout, owner: cache.owner(), cache: cache.clone() }, georeference, facts))
 }
 
 impl Tiff {
@@ -112,7 +114,7 @@ impl Raster for Tiff {
                 let chunk = self.layout.chunk_of(here.column, here.row);
                 let heights = match self.layout.counts[chunk] {
                     0 => None,
-                    _ => Some(self.cache.get(block, || self.block_heights(block))?),
+                    _ => Some(self.cache.get((self.owner, block), || self.block_heights(block))?),
                 };
                 for row in part.row..part.row + part.rows {
                     let from = (row - here.row) * columns + part.column - here.column;
