@@ -1,7 +1,7 @@
 //! The `.pm` file: progressive meshes as a stream of chunks. `FORMAT.md` specifies it.
 //!
 //! A file has a directory, the bases, then the splits, coarse to fine: by bands of error, within a band subtree by subtree. So every beginning that ends
-//! with a chunk is a mesh, and each chunk is one range of bytes. By default a chunk refers to the mesh that those before it make, which takes a third of the bits for
+//! with a chunk is a mesh, and each chunk is one range of bytes. By default a chunk refers to the mesh that those before it make, which takes a third to a quarter of the bits for
 //! connectivity; with [`EncodeOptions::alone`] each can be read alone. [`encode`] writes, [`decode`] reads all, [`PmReader`] reads a stream as it arrives,
 //! [`RangeReader`] fetches chunks in any order.
 //!

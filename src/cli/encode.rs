@@ -39,7 +39,7 @@ pub(crate) struct Args {
     /// Leave the order of vertices, faces and corners out, and what makes triangles polygons
     #[arg(long, help_heading = "File")]
     any_order: bool,
-    /// Chunks that can be read alone, in any order, for views that load only what they need: larger by a third
+    /// Chunks that can be read alone, in any order, for views that load only what they need: larger by half
     #[arg(long, help_heading = "File")]
     random_access: bool,
     /// Print one JSON object about the run on standard output (see docs/json.md)
