@@ -1,6 +1,6 @@
 //! Height grids: GeoTIFF, HGT, ESRI ASCII, PNG, raw samples; read window by window from bytes at any place ([`ReadAt`]).
 //!
-//! [`open`] reads what a file says about itself; its heights come when asked for, as a [`Raster`](crate::terrain::Raster). Nothing is allocated by
+//! [`open`] reads what a file says about itself; its heights come when asked for, as a [`Raster`]. Nothing is allocated by
 //! an announced size. Errors of decoding name the tile, the row or the line, and begin with the file's name.
 
 mod ascii;
