@@ -16,12 +16,15 @@ pub struct BlockCache {
 
 #[derive(Debug, Default)]
 struct State {
-    /// By owner and number, with the time of the last use.
-    blocks: HashMap<(usize, usize), (Arc<[f64]>, u64)>,
+    /// By owner and number.
+    blocks: HashMap<(usize, usize), Kept>,
     owners: usize,
     bytes: usize,
     clock: u64,
 }
+
+/// A block and the time of its last use.
+type Kept = (Arc<[f64]>, u64);
 
 impl BlockCache {
     /// An empty cache of at most this many bytes.
