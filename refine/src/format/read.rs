@@ -62,7 +62,7 @@ pub fn decode(bytes: &[u8]) -> Result<Decoded, FormatError> {
     }
 }
 
-/// Reads as much of a file as is there and undamaged; [`Report::damage`] says why it ended early, if it did.
+/// Reads as much of a file as is there and undamaged; [`super::Report::damage`] says why it ended early, if it did.
 ///
 /// Errors: damage of head or directory.
 pub fn decode_prefix(bytes: &[u8]) -> Result<Decoded, FormatError> {
