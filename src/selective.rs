@@ -51,7 +51,7 @@ pub enum SelectiveError {
 const HALVINGS: u32 = 24;
 
 impl SelectiveScene {
-    /// Builds the hierarchies; every mesh shows its base. About 20 microseconds a vertex.
+    /// Builds the hierarchies; every mesh shows its base. About 70 microseconds a vertex.
     ///
     /// Errors: a damaged mesh.
     pub fn new(scene: ProgressiveScene, options: &Options) -> Result<SelectiveScene, SelectiveError> {
