@@ -92,6 +92,84 @@ proptest! {
     }
 }
 
+/// A sheet of `n` by `n` cells over the unit square, bent by `bend` over its width and bumpy by `bumps`; then whatever `skip` says is left out.
+/// With `soup`, no two triangles share vertices.
+fn sheet(n: u32, z: f64, bend: f64, bumps: &[f64], skip: Option<u32>, soup: bool) -> Soup {
+    let m = n + 1;
+    let at = |i: u32| {
+        let (x, y) = (f64::from(i % m) / f64::from(n), f64::from(i / m) / f64::from(n));
+        let bump = bumps.get(i as usize % bumps.len().max(1)).copied().unwrap_or(0.0);
+        // On a cylinder that turns by `bend` in all.
+        let (angle, r) = (bend * (x - 0.5), 1.0 / bend.max(1e-3) - z - bump);
+        [r * angle.sin(), y, 1.0 / bend.max(1e-3) - r * angle.cos()]
+    };
+    let mut triangles: Vec<[u32; 3]> = (0..n * n)
+        .filter(|&i| skip != Some(i))
+        .flat_map(|i| {
+            let a = i / n * m + i % n;
+            [[a, a + 1, a + m + 1], [a, a + m + 1, a + m]]
+        })
+        .collect();
+    let mut points: Vec<[f64; 3]> = (0..m * m).map(at).collect();
+    if soup {
+        points = triangles.iter().flatten().map(|&v| points[v as usize]).collect();
+        triangles = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    }
+    (points, triangles)
+}
+
+/// Both as one.
+fn joined(a: &Soup, b: &Soup) -> Soup {
+    let n = a.0.len() as u32;
+    let points = a.0.iter().chain(&b.0).copied().collect();
+    (points, a.1.iter().copied().chain(b.1.iter().map(|t| t.map(|v| v + n))).collect())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Sheets that cover each other, or do not quite: with holes, folded back, close to another sheet, torn into soups, turned over.
+    #[test]
+    fn intervals_hold_for_sheets(
+        n in 1u32..7,
+        m in 1u32..5,
+        bend in prop_oneof![Just(0.0), 0.1..6.0],
+        bumps in prop::collection::vec(-0.1..0.1f64, 1..9),
+        hole in prop_oneof![Just(None), (0u32..36).prop_map(Some)],
+        double in prop_oneof![Just(None), (0.001..0.2f64).prop_map(Some)],
+        torn in any::<bool>(),
+        over in any::<bool>(),
+        digits in 2i32..7,
+    ) {
+        let a = sheet(n, 0.0, bend, &bumps, hole, torn);
+        let mut b = sheet(m, 0.01, bend, &[], None, !torn);
+        if let Some(away) = double {
+            b = joined(&b, &sheet(m + 1, 0.01 + away, bend, &[], None, false));
+        }
+        if over {
+            b.1.iter_mut().for_each(|t| t.swap(0, 1));
+        }
+        check(&a, &b, 10f64.powi(-digits))?;
+    }
+}
+
+#[test]
+fn a_sheet_over_another_takes_hardly_a_cut() {
+    // Triangles of the one cross many of the other: what covers them is proven together.
+    let (fine, coarse) = (sheet(60, 0.0, 1.5, &[], None, false), sheet(13, 0.0, 1.5, &[], None, false));
+    for torn in [false, true] {
+        let fine = if torn { sheet(60, 0.0, 1.5, &[], None, true) } else { fine.clone() };
+        let c = certify(&surface(&fine), &surface(&coarse), &CertifyOptions::with_tolerance(1e-6), &Quiet)
+            .unwrap();
+        assert!(c.converged && c.upper - c.lower <= 1e-6, "{c:?}");
+        // The sagitta of a thirteenth of the arc.
+        let half = 1.5 / 13.0 / 2.0f64;
+        let sagitta = (1.0 - half.cos()) / 1.5;
+        assert!(c.lower <= sagitta && sagitta * 0.9 <= c.upper, "{c:?} {sagitta}");
+        assert!(c.cuts < 20_000, "{}", c.cuts);
+    }
+}
+
 #[test]
 fn a_surface_against_itself_is_proven_to_be_there() {
     let m = sample("torus", 4000, 1);

@@ -131,6 +131,46 @@ impl Bvh {
         }
         Bvh { nodes, base }
     }
+
+    /// Calls `visit` for the triangles whose boxes meet the given one, until it says `false`; returns whether that never happened.
+    /// Does not go below child `i` of a level where `wanted(level, i)` is false.
+    #[inline]
+    pub(super) fn meeting(
+        &self,
+        (lo, hi): ([f32; 3], [f32; 3]),
+        wanted: impl Fn(u32, u32) -> bool,
+        mut visit: impl FnMut(u32) -> bool,
+    ) -> bool {
+        let (lo, hi) = (lo.map(Vec4::splat), hi.map(Vec4::splat));
+        // At most 3 wait on each of 16 levels, and 4.
+        let mut stack = [(0u32, 0u32); 64];
+        stack[0] = (self.base.len() as u32 - 1, 0);
+        let mut waiting = 1;
+        while waiting > 0 {
+            waiting -= 1;
+            let (level, i) = stack[waiting];
+            let n = &self.nodes[self.base[level as usize] as usize + i as usize];
+            let mut meet = n.lo[0].cmple(hi[0]) & n.hi[0].cmpge(lo[0]);
+            for k in 1..3 {
+                meet &= n.lo[k].cmple(hi[k]) & n.hi[k].cmpge(lo[k]);
+            }
+            let mut mask = meet.bitmask();
+            while mask != 0 {
+                let child = 4 * i + mask.trailing_zeros();
+                mask &= mask - 1;
+                if !wanted(level, child) {
+                    continue;
+                }
+                if level > 0 {
+                    stack[waiting] = (level - 1, child);
+                    waiting += 1;
+                } else if !visit(child) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
 }
 
 /// The least f32 not below `x` and the greatest not above it, in this order of use: `down(x) <= x <= up(x)`.

@@ -2,15 +2,17 @@
 //!
 //! From below, the distance is proven by a point: no triangle is nearer to the witness than the plane that separates the two. From
 //! above, by a triangle `t` of the other surface for every piece of a triangle: the distance from `t` is convex, so no point of the piece is
-//! farther from `t` than its farthest corner is (Tang, Lee & Kim 2009; Guthe, Borodin & Klein 2005). Pieces whose bound is above the interval
-//! are cut: along a side of `t`, which ends the matter at once where surfaces lie flat on each other, or in half.
+//! farther from `t` than its farthest corner is (Tang, Lee & Kim 2009; Guthe, Borodin & Klein 2005); or by the triangles that cover
+//! the piece together (`cover.rs`), which ends the matter for nearly all. Pieces whose bound is above the interval are cut: along a side of
+//! `t`, which ends the matter at once where surfaces lie flat on each other, or in half.
 //!
 //! **Rounding.** All is computed in f64 in the frame of the other surface, where that has radius 1. With `M` the greatest coordinate there, 1 at
-//! least: conversions move a point by less than 7 M 2^-53, each of at most 128 cuts moves a corner by less than 4 M 2^-53, and a
-//! distance between two points is off by less than 16 M 2^-53. The interval is widened on both sides by 1024 M 2^-53, which is more than all of
+//! least: conversions move a point by less than 7 M 2^-53, each of at most 128 cuts moves a corner by less than 4 M 2^-53, a distance
+//! between two points is off by less than 16 M 2^-53, and a height over a plane by less than 256 M 2^-53. The interval is widened on both sides by 1024 M 2^-53, which is more than all of
 //! that.
 
 use super::MeasureError;
+use super::cover::Cover;
 use super::distance::{Farthest, over_vertices};
 use super::pieces::{Corner, Piece};
 use super::progress::Progress;
@@ -208,8 +210,10 @@ struct Witness {
 
 /// Triangles to a chunk of the first pass.
 const CHUNK: usize = 2048;
-/// Pieces to a chunk of those that are cut at the same time.
+/// Pieces to a chunk of those that are cut at the same time, at most; where they are few, chunks are smaller.
 const SHARE: usize = 16;
+/// So many chunks are enough for all threads.
+const CHUNKS: usize = 64;
 /// Cuts to such a chunk.
 const QUOTA: u64 = 1 << 13;
 /// How far a level is above what is wanted, of the greatest bound there is.
@@ -232,6 +236,7 @@ fn one_sided(
     let tolerance = (options.tolerance * scale - 4.0 * slack).max(64.0 * slack);
     let (enough, too_much) = (goal.enough * scale - 2.0 * slack, goal.too_much * scale + slack);
     let corners = corners(a, b, progress)?;
+    let pair = Pair { a, b, shift, same: b.same_places() };
     let mut witness = first_witness(a, b, &shift, &corners);
     // Above what bounds have to come down.
     let target = |w: &Witness| (w.lower + tolerance).max(enough);
@@ -240,8 +245,18 @@ fn one_sided(
     let mut pieces = Vec::new();
     if witness.lower <= too_much {
         let dropped;
-        (pieces, dropped) = first_pieces(a, b, &shift, &corners, witness.lower, target(&witness), progress)?;
+        (pieces, dropped) = pair.first_pieces(&corners, witness.lower, target(&witness), progress)?;
         upper = upper.max(dropped);
+    }
+    if std::env::var("DBG").is_ok() {
+        eprintln!(
+            "first {} of {} lower {:.3e} wanted {:.3e} boundmax {:.3e}",
+            pieces.len(),
+            a.triangles.len(),
+            witness.lower,
+            target(&witness),
+            pieces.iter().fold(0f64, |t, p| t.max(p.bound))
+        );
     }
     // Bounds come down to a level, which comes down to what is wanted: what is above a level has to be cut whatever the final witness
     // is, as long as that is below the level.
@@ -253,15 +268,22 @@ fn one_sided(
         if level <= wanted * NEAR {
             level = wanted;
         }
-        let goal = Level { level, wanted };
+        let goal = Level { level, wanted, lower: witness.lower, tolerance };
+        if std::env::var("DBG").is_ok() {
+            eprintln!(
+                "level {level:.3e} wanted {wanted:.3e} pieces {} above {} cuts {cuts}",
+                pieces.len(),
+                pieces.iter().filter(|p| p.bound > level).count()
+            );
+        }
         let (above, rest): (Vec<Piece>, Vec<Piece>) = pieces.drain(..).partition(|p| p.bound > level);
         let shares: Vec<Result<Share, MeasureError>> = parallel::map_init_chunks(
             &above,
-            SHARE,
-            || b.query(),
-            |query, _, chunk| {
+            (above.len() / CHUNKS).clamp(1, SHARE),
+            || (b.query(), Cover::new(b, &pair.same)),
+            |(query, cover), _, chunk| {
                 progress.check()?;
-                Ok(goal.bring_down(b, query, chunk))
+                Ok(goal.bring_down(b, query, cover, chunk))
             },
         );
         pieces = rest;
@@ -337,6 +359,10 @@ struct Level {
     level: f64,
     /// Pieces below this need no more.
     wanted: f64,
+    /// The distance of the witness.
+    lower: f64,
+    /// How far above the witness bounds may stay.
+    tolerance: f64,
 }
 
 /// What became of a share of the pieces.
@@ -352,16 +378,31 @@ struct Share {
 }
 
 impl Level {
-    /// Cuts pieces until their bounds are below the level.
-    fn bring_down(&self, b: &Surface, query: &mut Query<'_>, pieces: &[Piece]) -> Share {
+    /// Cuts pieces until their bounds are below the level. A corner that is farther than the witness raises what is wanted at once.
+    fn bring_down(
+        &self,
+        b: &Surface,
+        query: &mut Query<'_>,
+        cover: &mut Cover<'_>,
+        pieces: &[Piece],
+    ) -> Share {
         let mut share = Share::default();
-        let mut farthest = 0.0;
-        let mut stack = Vec::new();
+        let mut farthest = self.lower;
+        let (mut level, mut wanted) = (self.level, self.wanted);
+        let mut stack: Vec<Piece> = Vec::new();
         for piece in pieces {
             stack.push(*piece);
             while let Some(piece) = stack.pop() {
                 if piece.depth >= DEPTH {
                     share.dropped = share.dropped.max(piece.bound);
+                    continue;
+                }
+                if piece.bound <= level {
+                    if piece.bound > wanted {
+                        share.left.push(piece);
+                    } else {
+                        share.dropped = share.dropped.max(piece.bound);
+                    }
                     continue;
                 }
                 if share.cuts >= QUOTA {
@@ -374,15 +415,17 @@ impl Level {
                         if d > farthest {
                             farthest = d;
                             share.far = Some((d, at, part.triangle));
+                            wanted = wanted.max(b.at_least(at, d) + self.tolerance);
+                            level = level.max(wanted);
                         }
                     }
                     part.bound_by_points();
-                    if part.bound > self.wanted {
-                        part.bound_by_triangles(b, self.wanted);
+                    if part.bound > wanted {
+                        part.bound_by_triangles(b, cover, wanted);
                     }
-                    if part.bound > self.level {
+                    if part.bound > level {
                         stack.push(part);
-                    } else if part.bound > self.wanted {
+                    } else if part.bound > wanted {
                         share.left.push(part);
                     } else {
                         share.dropped = share.dropped.max(part.bound);
@@ -394,49 +437,60 @@ impl Level {
     }
 }
 
-/// All triangles of `a` whose bound is above `enough`, as pieces; and the greatest bound of the others. Bounds below `lower` are of no
-/// interest.
-fn first_pieces(
-    a: &Surface,
-    b: &Surface,
-    shift: &Shift,
-    corners: &[Best],
-    lower: f64,
-    enough: f64,
-    progress: &Progress<'_>,
-) -> Result<(Vec<Piece>, f64), MeasureError> {
-    type Chunk = Result<(Vec<Piece>, f64), MeasureError>;
-    let chunks: Vec<Chunk> = parallel::map_init_chunks(
-        &a.triangles,
-        CHUNK,
-        || (),
-        |_, first, chunk| {
-            progress.check()?;
-            let (mut pieces, mut dropped) = (Vec::new(), 0f64);
-            for (i, t) in chunk.iter().enumerate() {
-                let corner = |v: u32| Corner::new(shift.apply(a.points[v as usize]), corners[v as usize], b);
-                let mut piece = Piece::whole(t.map(corner), (first + i) as u32);
-                piece.bound_by_points();
-                if piece.bound > lower {
-                    piece.bound_by_triangles(b, enough);
+/// From which surface to which.
+struct Pair<'a> {
+    a: &'a Surface,
+    b: &'a Surface,
+    shift: Shift,
+    /// What [`Surface::same_places`] says of `b`.
+    same: Vec<u32>,
+}
+
+impl Pair<'_> {
+    /// All triangles of `a` whose bound is above `enough`, as pieces; and the greatest bound of the others. Bounds below `lower` are of no
+    /// interest.
+    fn first_pieces(
+        &self,
+        corners: &[Best],
+        lower: f64,
+        enough: f64,
+        progress: &Progress<'_>,
+    ) -> Result<(Vec<Piece>, f64), MeasureError> {
+        let Pair { a, b, shift, same } = self;
+        type Chunk = Result<(Vec<Piece>, f64), MeasureError>;
+        let chunks: Vec<Chunk> = parallel::map_init_chunks(
+            &a.triangles,
+            CHUNK,
+            || Cover::new(b, same),
+            |cover, first, chunk| {
+                progress.check()?;
+                let (mut pieces, mut dropped) = (Vec::new(), 0f64);
+                for (i, t) in chunk.iter().enumerate() {
+                    let corner =
+                        |v: u32| Corner::new(shift.apply(a.points[v as usize]), corners[v as usize], b);
+                    let mut piece = Piece::whole(t.map(corner), (first + i) as u32);
+                    piece.bound_by_points();
+                    if piece.bound > lower {
+                        piece.bound_by_triangles(b, cover, enough);
+                    }
+                    if piece.bound > enough {
+                        pieces.push(piece);
+                    } else {
+                        dropped = dropped.max(piece.bound);
+                    }
                 }
-                if piece.bound > enough {
-                    pieces.push(piece);
-                } else {
-                    dropped = dropped.max(piece.bound);
-                }
-            }
-            progress.add(chunk.len());
-            Ok((pieces, dropped))
-        },
-    );
-    let (mut pieces, mut dropped) = (Vec::new(), 0f64);
-    for chunk in chunks {
-        let (more, bound) = chunk?;
-        pieces.extend(more);
-        dropped = dropped.max(bound);
+                progress.add(chunk.len());
+                Ok((pieces, dropped))
+            },
+        );
+        let (mut pieces, mut dropped) = (Vec::new(), 0f64);
+        for chunk in chunks {
+            let (more, bound) = chunk?;
+            pieces.extend(more);
+            dropped = dropped.max(bound);
+        }
+        Ok((pieces, dropped))
     }
-    Ok((pieces, dropped))
 }
 
 fn farthest(a: &Surface, b: &Surface, shift: &Shift, witness: &Witness) -> Farthest {

@@ -9,7 +9,7 @@ use super::progress::Progress;
 use super::surface::Surface;
 use crate::options::Control;
 use crate::parallel;
-use glam::{DVec3, Vec4};
+use glam::DVec3;
 use robust::{Coord, Coord3D};
 
 /// Pairs of triangles that meet where they should not.
@@ -82,38 +82,12 @@ pub fn self_intersections(
 impl Surface {
     /// Calls `visit` for the triangles after `t` (in the order of the hierarchy) whose boxes meet that of `t`.
     fn meeting_boxes(&self, t: usize, mut visit: impl FnMut(usize)) {
-        let (lo, hi) = bounds_of(self.corners(t));
-        let (lo, hi) = (lo.map(Vec4::splat), hi.map(Vec4::splat));
-        let bvh = &self.bvh;
-        let root = bvh.base.len() - 1;
-        // At most 3 wait on each of 16 levels, and 4.
-        let mut stack = [(0u32, 0u32); 64];
-        stack[0] = (root as u32, 0);
-        let mut waiting = 1;
-        while waiting > 0 {
-            waiting -= 1;
-            let (level, i) = stack[waiting];
-            let n = &bvh.nodes[bvh.base[level as usize] as usize + i as usize];
-            let mut meet = n.lo[0].cmple(hi[0]) & n.hi[0].cmpge(lo[0]);
-            for k in 1..3 {
-                meet &= n.lo[k].cmple(hi[k]) & n.hi[k].cmpge(lo[k]);
-            }
-            let mut mask = meet.bitmask();
-            while mask != 0 {
-                let child = 4 * i + mask.trailing_zeros();
-                mask &= mask - 1;
-                // The last triangle below the child: nothing to find there if it is not after `t`.
-                if ((child as usize + 1) << (2 * level)) - 1 <= t {
-                    continue;
-                }
-                if level == 0 {
-                    visit(child as usize);
-                } else {
-                    stack[waiting] = (level - 1, child);
-                    waiting += 1;
-                }
-            }
-        }
+        // The last triangle below a child: nothing to find there if it is not after `t`.
+        let after = |level: u32, child: u32| ((child as usize + 1) << (2 * level)) - 1 > t;
+        self.bvh.meeting(bounds_of(self.corners(t)), after, |u| {
+            visit(u as usize);
+            true
+        });
     }
 }
 

@@ -27,6 +27,7 @@
 
 mod bvh;
 mod certify;
+mod cover;
 mod deviation;
 mod distance;
 mod error;

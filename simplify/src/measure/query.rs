@@ -163,29 +163,6 @@ impl Surface {
         least
     }
 
-    /// The triangle whose greatest squared distance from the three points is least, if there is one below `d2`; and that distance. For
-    /// points that are near.
-    pub(super) fn least_of_greatest(&self, points: &[DVec3; 3], d2: f64) -> Option<(u32, f64)> {
-        if !points.iter().all(|&p| near(p)) {
-            return None;
-        }
-        let around = points.map(Around::new);
-        let mut found = None;
-        let mut least = d2;
-        let squared = |n: &Node| {
-            let [x, y, z] = [0, 1, 2].map(|k| around[k].squared(n));
-            x.max(y).max(z)
-        };
-        self.descend(d2, squared, |t| {
-            let greatest = greatest(self.corners(t as usize), points, least);
-            if greatest < least {
-                (least, found) = (greatest, Some(t));
-            }
-            least
-        });
-        found.map(|t| (t, least))
-    }
-
     /// Visits the triangles below all nodes whose `squared` distances (of the children) are within the limit, near ones first; `visit` returns
     /// the new limit.
     #[inline]

@@ -5,6 +5,8 @@ use super::bvh::{self, Bvh};
 use crate::parallel;
 use glam::DVec3;
 use progmesh_aif::{Mesh, Positions};
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Positions as a caller has them.
 #[derive(Clone, Copy, Debug)]
@@ -187,6 +189,18 @@ impl Surface {
         Ok(Surface { frame, points, triangles, ids, vertex_ids, input_vertices: input.len(), bvh, lo, hi })
     }
 
+    /// Vertex -> the first vertex at the same place. O(n) in effect.
+    pub(super) fn same_places(&self) -> Vec<u32> {
+        let mut first: HashMap<[u64; 3], u32, BuildHasherDefault<Places>> = HashMap::default();
+        first.reserve(self.points.len());
+        let number = |(v, p): (usize, &DVec3)| {
+            // One zero.
+            let bits = p.to_array().map(|x| (x + 0.0).to_bits());
+            *first.entry(bits).or_insert(v as u32)
+        };
+        self.points.iter().enumerate().map(number).collect()
+    }
+
     /// Number of triangles.
     pub fn triangle_count(&self) -> usize {
         self.triangles.len()
@@ -231,6 +245,29 @@ impl Surface {
     pub(super) fn point_on(&self, t: u32, v: f64, w: f64) -> DVec3 {
         let [a, b, c] = self.corners(t as usize);
         a + (b - a) * v + (c - a) * w
+    }
+}
+
+/// Mixes coordinates: their high bits tell them apart.
+#[derive(Default)]
+struct Places(u64);
+
+impl Hasher for Places {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&b| self.write_u64(u64::from(b)));
+    }
+
+    fn write_u64(&mut self, x: u64) {
+        let mixed = (self.0 ^ x).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        self.0 = mixed ^ mixed >> 32;
+    }
+
+    fn write_usize(&mut self, _: usize) {
+        // The length of an array, always the same.
+    }
+
+    fn finish(&self) -> u64 {
+        self.0.wrapping_mul(0x9e37_79b9_7f4a_7c15)
     }
 }
 
