@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::simplify::Control;
 use crate::simplify::measure::{
     Certified, CertifyOptions, CornerValues, Deviations, DistanceOptions, Distances, MeasureError,
-    SelfIntersections, Surface, TopologySummary, TriangleQuality, certify, deviations, distance,
+    SelfIntersections, Surface, TopologySummary, TriangleQuality, certify, distance, distance_and_deviations,
     self_intersections, triangle_quality, turned_triangles,
 };
 use glam::DVec3;
@@ -74,10 +74,11 @@ impl Flattened {
     ///
     /// Errors: an array of a mesh is wrong; there is no triangle; a vertex in use is not finite. O(n log n).
     pub fn of(scene: &Scene) -> Result<Flattened, CompareError> {
-        for (mesh, m) in scene.meshes.iter().enumerate() {
-            let failed = |source| CompareError::Mesh { mesh: crate::pipeline::label(scene, mesh), source };
-            m.geometry.validate().map_err(failed)?;
-        }
+        check(scene)?;
+        Self::of_valid(scene)
+    }
+
+    fn of_valid(scene: &Scene) -> Result<Flattened, CompareError> {
         let flat = flatten(scene, "a comparison");
         let corners = triangles(&flat.geometry);
         let triangles: Vec<_> =
@@ -90,13 +91,29 @@ impl Flattened {
 
     /// The same with its topology counted, as one mesh: instances that touch stay apart.
     pub fn with_topology(scene: &Scene) -> Result<Flattened, CompareError> {
-        let mut flattened = Flattened::of(scene)?;
-        let input = flatten(scene, "a comparison").geometry.into_owned();
+        check(scene)?;
+        let topology = || {
+            let input = flatten(scene, "a comparison").geometry.into_owned();
+            Mesh::build(input, &BuildOptions::default()).map(|(mesh, _)| TopologySummary::of(&mesh))
+        };
+        #[cfg(feature = "parallel")]
+        let (flattened, topology) = rayon::join(|| Flattened::of_valid(scene), topology);
+        #[cfg(not(feature = "parallel"))]
+        let (flattened, topology) = (Flattened::of_valid(scene), topology());
+        let mut flattened = flattened?;
         let failed = |source| CompareError::Mesh { mesh: String::new(), source };
-        let (mesh, _) = Mesh::build(input, &BuildOptions::default()).map_err(failed)?;
-        flattened.topology = Some(TopologySummary::of(&mesh));
+        flattened.topology = Some(topology.map_err(failed)?);
         Ok(flattened)
     }
+}
+
+/// Every mesh is one.
+fn check(scene: &Scene) -> Result<(), CompareError> {
+    for (mesh, m) in scene.meshes.iter().enumerate() {
+        let failed = |source| CompareError::Mesh { mesh: crate::pipeline::label(scene, mesh), source };
+        m.geometry.validate().map_err(failed)?;
+    }
+    Ok(())
 }
 
 /// All faces as triangles of corner slots, in order.
@@ -152,7 +169,7 @@ pub struct Comparison {
     pub certified: Option<Certified>,
     /// Everything else, unless distances alone were asked for.
     pub details: Option<Details>,
-    /// Seconds that sampling took.
+    /// Seconds that sampling took: distances and, unless distances alone were asked for, deviations.
     pub distance_seconds: f64,
     /// Seconds that the proof took.
     pub certify_seconds: f64,
@@ -179,16 +196,16 @@ pub struct Details {
 fn details(
     a: &Flattened,
     b: &Flattened,
-    options: &DistanceOptions,
+    deviations: Deviations,
     control: &dyn Control,
 ) -> Result<Details, MeasureError> {
     let part = |start, share| Part::new(control, start, share);
     Ok(Details {
-        deviations: deviations((&a.surface, &a.values), (&b.surface, &b.values), options, &part(0.0, 0.7))?,
+        deviations,
         topology: [a.topology, b.topology],
-        turned: turned_triangles(&a.surface, &b.surface, &part(0.7, 0.2))?.len(),
+        turned: turned_triangles(&a.surface, &b.surface, &part(0.0, 0.7))?.len(),
         quality: [a, b].map(|s| triangle_quality(&s.surface)),
-        self_intersections: self_intersections(&b.surface, &part(0.9, 0.1))?,
+        self_intersections: self_intersections(&b.surface, &part(0.7, 0.3))?,
     })
 }
 
@@ -201,27 +218,38 @@ pub fn compare(
     options: &CompareOptions,
     control: &dyn Control,
 ) -> Result<Comparison, CompareError> {
-    // Each of the three takes about as long as the others, more or less.
-    let parts = 1.0 + f64::from(options.certify.is_some()) + f64::from(!options.distance_only);
-    let part = |k: f64| Part::new(control, k / parts, 1.0 / parts);
+    // How long each takes, roughly.
+    let [sampling, proving, rest] = [
+        5.0,
+        if options.certify.is_some() { 4.0 } else { 0.0 },
+        if options.distance_only { 0.0 } else { 1.0 },
+    ];
+    let all = sampling + proving + rest;
+    let part = |start: f64, share: f64| Part::new(control, start / all, share / all);
     let start = Instant::now();
-    let distances = distance(&a.surface, &b.surface, &options.distance, &part(0.0))?;
+    let control = part(0.0, sampling);
+    let (distances, deviations) = match options.distance_only {
+        true => (distance(&a.surface, &b.surface, &options.distance, &control)?, None),
+        false => {
+            let (of_a, of_b) = ((&a.surface, &a.values[..]), (&b.surface, &b.values[..]));
+            let (distances, deviations) = distance_and_deviations(of_a, of_b, &options.distance, &control)?;
+            (distances, Some(deviations))
+        }
+    };
     let distance_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let certified = match options.certify {
         Some(tolerance) => {
             let mut how = CertifyOptions::with_tolerance(tolerance * a.surface.diagonal());
             how.threads = options.distance.threads;
-            Some(certify(&a.surface, &b.surface, &how, &part(1.0))?)
+            Some(certify(&a.surface, &b.surface, &how, &part(sampling, proving))?)
         }
         None => None,
     };
     let certify_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let details = match options.distance_only {
-        true => None,
-        false => Some(details(a, b, &options.distance, &part(parts - 1.0))?),
-    };
+    let rest = part(sampling + proving, rest);
+    let details = deviations.map(|found| details(a, b, found, &rest)).transpose()?;
     Ok(Comparison {
         triangles: [a, b].map(|s| s.surface.triangle_count()),
         distances,

@@ -72,6 +72,35 @@ fn check(a: &Soup, b: &Soup, tolerance: f64) -> Result<(), TestCaseError> {
         let (from, to) = if on_a { (a, b) } else { (b, a) };
         prop_assert!(witness.distance > below && brute(from, to, 1) <= c.upper);
     }
+    check_places(a, b, c.upper * 1.001 + tolerance, tolerance)?;
+    check_places(a, b, 0.7 * c.lower, tolerance)
+}
+
+/// All triangles with a point beyond the bound are named, and no other.
+fn check_places(a: &Soup, b: &Soup, bound: f64, tolerance: f64) -> Result<(), TestCaseError> {
+    let options = CertifyOptions::with_tolerance(tolerance);
+    let found = exceeding(&surface(a), &surface(b), bound, usize::MAX, &options, &Quiet).unwrap();
+    prop_assert_eq!(found.upper.is_some(), found.places.is_empty());
+    prop_assert!(found.upper.is_none_or(|u| u <= bound));
+    for (on_a, from, to) in [(true, a, b), (false, b, a)] {
+        for t in 0..from.1.len() {
+            let one: Soup = (from.0.clone(), vec![from.1[t]]);
+            let far = brute(&one, to, 6);
+            let mut named = found.places.iter().filter(|p| p.on_a == on_a && p.triangle as usize == t);
+            let place = named.next();
+            prop_assert!(named.next().is_none());
+            prop_assert!(place.is_some() || far <= bound, "triangle {t}: {far} {bound}");
+            if let Some(place) = place {
+                let corners = from.1[t].map(|v| DVec3::from_array(from.0[v as usize]));
+                prop_assert!(closest(place.point, &corners).distance(place.point) < 1e-9);
+                prop_assert!(place.distance >= bound - tolerance - 1e-9, "{place:?} {bound}");
+            }
+        }
+    }
+    let least = found.by_triangle.iter().copied().fold(0.0, f64::max);
+    prop_assert!(
+        found.by_triangle.len() == b.1.len() && (brute(b, a, 1) - least).min(brute(a, b, 1) - least) <= 1e-9
+    );
     Ok(())
 }
 

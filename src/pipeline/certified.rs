@@ -1,18 +1,21 @@
 //! As few triangles as a proven bound of the distance allows: a search over runs of the method.
 
 use super::{Job, JobError, Part, Proven, Summary, run, scale};
-use crate::aif::{Bits, Weld};
+use crate::aif::{Bits, Positions, Weld};
 use crate::compare::{CompareError, Flattened};
 use crate::scene::Scene;
-use crate::simplify::measure::{CertifyOptions, MeasureError, Within, vertex_distances, within};
+use crate::simplify::measure::{CertifyOptions, MeasureError, Place, exceeding};
 use crate::simplify::{Control, Stop};
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 /// The search ends where a number of triangles passes and one this much smaller does not. What is promised is 1.1.
 const CLOSE: f64 = 1.05;
-/// The first step from a number that passes to one that does not, or the other way, and how steps grow.
-const STEP: f64 = 1.4;
-const GROWTH: f64 = 1.2;
+/// From a number that passes to one that does not, or the other way, at most by these factors.
+const DOWN: f64 = 3.0;
+const UP: f64 = 3.0;
+/// A guess is taken this much to the safe side of what the last runs suggest.
+const SAFE: f64 = 1.02;
 /// Of the bound: closer to it than this a result is not looked into further, and does not pass. The error falls about as the number of
 /// triangles rises, so this costs half a per cent of them.
 const NEAR: f64 = 0.005;
@@ -22,11 +25,16 @@ const ESTIMATE: f64 = 0.25;
 /// Runs that a search takes, about; for the progress bar.
 const RUNS: f64 = 12.0;
 /// Where a run fails at a few places only (a thin fold that a quadric does not see is enough), the vertices there are kept and it runs
-/// again, at most so often in a search: on bunny and dragon such places would cost half of all triangles.
-const MENDS: usize = 4;
-/// One vertex of so many may be kept, and `SPARE` more.
-const KEPT: usize = 1000;
+/// again, at most so often in a row: on dragon such places would cost more than nine tenths of all triangles.
+const MENDS: usize = 3;
+/// So many vertices may be kept: one for so many triangles of the result, and `SPARE` more.
+const KEPT: usize = 20;
 const SPARE: usize = 16;
+/// Places are not all looked for where they are more than so many a triangle that may be mended.
+const PLACES: usize = 40;
+/// Once a result has no more triangles than a plain run that fails, what is promised is kept. The search goes on only while all runs together
+/// took in fewer triangles than this: seconds. Bunny at a thousandth of the diagonal comes from 20,000 down to 10,000 by then.
+const WORK: usize = 1_000_000;
 
 /// A result that passed.
 struct Passed {
@@ -47,31 +55,34 @@ pub(super) fn simplify(
     let all = scene.unique_triangles();
     // Vertices of the scene are those of its mesh only where there is one, which is not welded.
     let vertices = scene.meshes.first().map_or(0, |m| m.geometry.positions.len());
-    let single = scene.meshes.len() == 1 && vertices == input.positions.len() && job.weld == Weld::No;
-    let may_keep = if single { vertices / KEPT + SPARE } else { 0 };
+    let may_keep = scene.meshes.len() == 1 && vertices == input.positions.len() && job.weld == Weld::No;
+    // What is written in single precision moves by that much.
+    let exact = matches!(input.positions, Positions::F32(_));
+    let (lo, hi) = input.surface.bounds();
+    let rounding =
+        if exact { 0.0 } else { 3f64.sqrt() * lo.abs().max(hi.abs()).max_element() * 2f64.powi(-24) };
     let mut search = Search {
         scene: &scene,
         input,
         job,
         control,
-        bound,
-        kept: Bits::new(if single { vertices } else { 0 }),
+        bound: bound - rounding.min(bound),
+        rounding,
+        kept: Bits::new(if may_keep { vertices } else { 0 }),
         may_keep,
-        mends: 0,
+        fails_plain: 0,
         runs: 0,
         seconds: [0.0; 3],
     };
     // Targets of the job end the search from below.
     let floor = super::target(&job.options, &[all], false).unwrap_or(1).clamp(1, all);
 
-    // The number that passes is `high`, that does not is `low`; each `None` until there is one.
-    let (mut high, mut low): (Option<usize>, Option<usize>) = (None, None);
+    let mut range = Range::new(search.bound, floor, all);
     let mut best: Option<Passed> = None;
     let mut next = None;
-    let mut step = STEP;
     loop {
         let (asked, found) = search.probe(next)?;
-        let Some((passed, summary, scene)) = found else {
+        let Some(Probe { upper, spread, summary, scene }) = found else {
             // Cancelled: the input, as far as a caller cares.
             let (scene, mut summary) = search.unchanged()?;
             summary.stop = Stop::Cancelled;
@@ -82,32 +93,22 @@ pub(super) fn simplify(
         let asked = asked.unwrap_or(got).max(floor);
         // Fewer cannot be had.
         let stuck = got > asked;
-        match passed {
-            Some(upper) => {
-                high = Some(asked);
-                if best.as_ref().is_none_or(|b| got <= b.summary.triangles_out) {
-                    best = Some(Passed { scene, summary, upper });
-                }
-                if stuck || asked <= floor {
-                    break;
-                }
+        range.add(asked, spread, upper.is_some());
+        if let Some(upper) = upper {
+            if best.as_ref().is_none_or(|b| got <= b.summary.triangles_out) {
+                best = Some(Passed { scene, summary, upper });
             }
-            None => {
-                low = Some(asked.max(low.unwrap_or(0)));
-                if asked >= all {
-                    break;
-                }
+            if stuck {
+                break;
             }
         }
-        next = Some(match (high, low) {
-            (Some(h), Some(l)) if (h as f64) <= CLOSE * l as f64 || h <= l + 1 => break,
-            (Some(h), Some(l)) => ((h as f64 * l as f64).sqrt().round() as usize).clamp(l + 1, h - 1),
-            (Some(h), None) => ((h as f64 / step) as usize).clamp(floor, h - 1),
-            (None, Some(l)) => ((l as f64 * step).ceil() as usize).clamp((l + 1).min(all), all),
-            (None, None) => break,
-        });
-        if high.is_none() || low.is_none() {
-            step *= GROWTH;
+        let promised = range.high.is_some_and(|h| h as f64 <= CLOSE * search.fails_plain as f64);
+        if promised && search.runs * all >= WORK {
+            break;
+        }
+        match range.next() {
+            Some(n) => next = Some(n),
+            None => break,
         }
     }
     let passed = best.map(|b| (b.scene, b.summary, b.upper));
@@ -123,7 +124,7 @@ pub(super) fn simplify(
     let reached = target.is_some_and(|t| summary.triangles_out <= t);
     summary.stop = match summary.stop {
         _ if reached => Stop::Target,
-        Stop::NoLegalCollapse if low.is_none() => Stop::NoLegalCollapse,
+        Stop::NoLegalCollapse if range.low.is_none() => Stop::NoLegalCollapse,
         _ => Stop::Error,
     };
     summary.target = None;
@@ -137,47 +138,62 @@ struct Search<'a> {
     input: &'a Flattened,
     job: &'a Job,
     control: &'a dyn Control,
+    /// What results have to keep, before they are rounded.
     bound: f64,
+    rounding: f64,
     /// Vertices that runs do not touch.
     kept: Bits,
-    /// How many these may become.
-    may_keep: usize,
-    mends: usize,
+    may_keep: bool,
+    /// The greatest number of triangles that does not pass while no vertex is kept.
+    fails_plain: usize,
     runs: usize,
     /// Building, simplifying, measuring.
     seconds: [f64; 3],
 }
 
-/// The bound that was proven, if it was; what came of the run.
-type Probe = (Option<f64>, Summary, Scene);
+/// What came of a run.
+struct Probe {
+    /// The bound that was proven, if it was.
+    upper: Option<f64>,
+    /// How far the triangles of the result are from the vertices of the input, but for as many as may be mended.
+    spread: f64,
+    summary: Summary,
+    scene: Scene,
+}
 
 /// What became of a result.
-enum Verdict {
-    /// Its distance is proven to be at most this.
-    Passed(f64),
-    /// It is not; these vertices of the input are at the places where, as far as is known.
-    Failed(Vec<u32>),
+struct Verdict {
+    upper: Option<f64>,
+    spread: f64,
+    /// Vertices of the input at the places that are too far, if they are few enough to be kept.
+    far: Vec<u32>,
 }
 
 impl Search<'_> {
     /// A run to this many triangles, or by the estimate, and again where keeping a few vertices may help; `None` when cancelled.
     fn probe(&mut self, triangles: Option<usize>) -> Result<(Option<usize>, Option<Probe>), JobError> {
+        let mut mends = if self.may_keep { MENDS } else { 0 };
         loop {
             let Some((scene, summary)) = self.run_once(triangles)? else { return Ok((triangles, None)) };
             let now = Instant::now();
             let [start, share] = self.share();
             let control = Part::new(self.control, start + 0.5 * share, 0.5 * share);
-            let verdict = match self.judge(&scene, &control) {
+            let Verdict { upper, spread, far } = match self.judge(&scene, &control) {
                 Err(CompareError::Measure(MeasureError::Cancelled)) => return Ok((triangles, None)),
                 verdict => verdict?,
             };
             self.seconds[2] += now.elapsed().as_secs_f64();
-            let upper = match verdict {
-                Verdict::Passed(upper) => Some(upper),
-                Verdict::Failed(places) if self.keep(&places) => continue,
-                Verdict::Failed(_) => None,
-            };
-            return Ok((triangles, Some((upper, summary, scene))));
+            if upper.is_none() && self.kept.count() == 0 {
+                self.fails_plain = self.fails_plain.max(summary.triangles_out);
+            }
+            if upper.is_none() && !far.is_empty() {
+                far.iter().for_each(|&v| self.kept.set(v as usize));
+                if mends > 0 {
+                    mends -= 1;
+                    continue;
+                }
+            }
+            return Ok((triangles, Some(Probe { upper, spread, summary, scene })));
         }
     }
 
@@ -201,7 +217,7 @@ impl Search<'_> {
             }
             _ => None,
         };
-        if self.mends > 0 {
+        if self.kept.count() > 0 {
             let given = &job.options.locked_vertices;
             let mut locked = self.kept.clone();
             let also = (0..self.input.positions.len()).filter(|&v| given.get(v));
@@ -217,52 +233,72 @@ impl Search<'_> {
         Ok((summary.stop != Stop::Cancelled).then_some((scene, summary)))
     }
 
-    /// Keeps these vertices from now on, if they are few.
-    fn keep(&mut self, places: &[u32]) -> bool {
-        let new = places.iter().filter(|&&v| !self.kept.get(v as usize)).count();
-        if new == 0 || self.mends >= MENDS || self.kept.count() + new > self.may_keep {
-            return false;
-        }
-        self.mends += 1;
-        places.iter().for_each(|&v| self.kept.set(v as usize));
-        true
-    }
-
-    /// The vertices of the input that are too far from a result, and those near vertices of it that are too far from the input.
-    fn far(&self, result: &Flattened, control: &dyn Control) -> Result<Vec<u32>, MeasureError> {
-        let input = &self.input.surface;
-        let there = vertex_distances(input, &result.surface, &Part::new(control, 0.0, 0.2))?;
-        let mut far: Vec<u32> = (0..).zip(&there).filter(|(_, d)| **d > self.bound).map(|(v, _)| v).collect();
-        let back = vertex_distances(&result.surface, input, &Part::new(control, 0.2, 0.1))?;
-        if far.len() <= self.may_keep {
-            let mut query = input.query();
-            for (v, _) in back.iter().enumerate().filter(|(_, d)| **d > self.bound) {
-                let closest = query.closest(result.positions.get(v));
-                far.extend(self.input.triangles.get(closest.triangle as usize).into_iter().flatten());
-            }
-        }
-        Ok(far)
+    /// How many more places of a result of so many triangles may be kept.
+    fn spare(&self, triangles: usize) -> usize {
+        let all = if self.may_keep { triangles / KEPT + SPARE } else { 0 };
+        // A place in the middle of a triangle takes its three corners.
+        all.saturating_sub(self.kept.count()) / 3
     }
 
     fn judge(&self, result: &Scene, control: &dyn Control) -> Result<Verdict, CompareError> {
         let result = match Flattened::of(result) {
-            Err(CompareError::Measure(MeasureError::NoTriangle)) => return Ok(Verdict::Failed(vec![])),
+            Err(CompareError::Measure(MeasureError::NoTriangle)) => {
+                return Ok(Verdict { upper: None, spread: f64::INFINITY, far: vec![] });
+            }
             result => result?,
         };
-        if self.mends < MENDS && self.may_keep > 0 {
-            let far = self.far(&result, control)?;
-            if !far.is_empty() {
-                return Ok(Verdict::Failed(far));
-            }
-        }
+        let spare = self.spare(result.triangles.len());
         let mut options = CertifyOptions::with_tolerance(NEAR * self.bound);
         options.threads = self.job.options.threads;
-        let control = Part::new(control, 0.3, 0.7);
-        Ok(match within(&self.input.surface, &result.surface, self.bound, &options, &control)? {
-            Within::Yes { upper } => Verdict::Passed(upper),
-            // Where it is not even a vertex that is too far, there are more such places than one.
-            _ => Verdict::Failed(vec![]),
-        })
+        // Many vertices of the input lie over one triangle of the result.
+        let limit = spare.saturating_mul(PLACES);
+        let found = exceeding(&self.input.surface, &result.surface, self.bound, limit, &options, control)?;
+        let mut all = found.by_triangle;
+        let rank = all.len().saturating_sub(spare + 1);
+        let spread = if all.is_empty() { 0.0 } else { *all.select_nth_unstable_by(rank, f64::total_cmp).1 };
+        let mut far = Vec::new();
+        if found.upper.is_none() && found.places.len() <= limit {
+            far = self.vertices_at(&found.places, spare);
+        }
+        Ok(Verdict { upper: found.upper.map(|u| u + self.rounding), spread, far })
+    }
+
+    /// Vertices of the input at places, those that are kept already left out: at all of them, or, if that is too many, at the worst of every
+    /// triangle of the result; none if the triangles are more than `most`.
+    fn vertices_at(&self, places: &[Place], most: usize) -> Vec<u32> {
+        let mut worst: BTreeMap<u32, &Place> = BTreeMap::new();
+        for place in places {
+            let triangle = if place.on_a { place.closest_triangle } else { place.triangle };
+            let at = worst.entry(triangle).or_insert(place);
+            if place.distance > at.distance {
+                *at = place;
+            }
+        }
+        if worst.len() > most {
+            return vec![];
+        }
+        let mut all = Vec::new();
+        places.iter().for_each(|p| self.vertices_of(p, &mut all));
+        all.sort_unstable();
+        all.dedup();
+        if all.len() > 3 * most {
+            all.clear();
+            worst.values().for_each(|p| self.vertices_of(p, &mut all));
+        }
+        all
+    }
+
+    /// Adds the vertex of the input at a place; where there is none, the corners of the triangle.
+    fn vertices_of(&self, place: &Place, found: &mut Vec<u32>) {
+        let triangle = if place.on_a { place.triangle } else { place.closest_triangle };
+        let Some(corners) = self.input.triangles.get(triangle as usize) else { return };
+        let at =
+            |v: &u32| self.input.positions.get(*v as usize).distance(place.point) <= 1e-9 * place.distance;
+        let new = |v: &u32| !self.kept.get(*v as usize);
+        match corners.iter().find(|v| at(v) && new(v)) {
+            Some(&v) => found.push(v),
+            None => found.extend(corners.iter().filter(|v| new(v))),
+        }
     }
 
     /// The input as it is, and a summary that says so.
@@ -277,5 +313,79 @@ impl Search<'_> {
         summary.warnings = vec!["no simpler mesh passes: the result is the input as it was".into()];
         (summary.stop, summary.estimate) = (Stop::Error, 0.0);
         Ok((self.scene.clone(), summary))
+    }
+}
+
+/// What is known of the numbers of triangles that pass.
+struct Range {
+    bound: f64,
+    floor: usize,
+    all: usize,
+    /// The least that passes.
+    high: Option<usize>,
+    /// The greatest that does not.
+    low: Option<usize>,
+    /// The last runs: triangles and how far vertices are.
+    last: Option<(usize, f64)>,
+    before: Option<(usize, f64)>,
+    /// How often numbers were raised in a row.
+    raised: i32,
+    /// The ratio between the two at the last guess.
+    ratio: f64,
+}
+
+impl Range {
+    fn new(bound: f64, floor: usize, all: usize) -> Self {
+        let (high, low, last, before) = (None, None, None, None);
+        Range { bound, floor, all, high, low, last, before, raised: 0, ratio: f64::INFINITY }
+    }
+
+    fn add(&mut self, triangles: usize, spread: f64, passed: bool) {
+        match passed {
+            true => self.high = Some(triangles.min(self.high.unwrap_or(triangles))),
+            false => self.low = Some(triangles.max(self.low.unwrap_or(0))),
+        }
+        self.raised = if passed { 0 } else { self.raised + 1 };
+        // Vertices that are near enough say nothing of what keeps a result from passing.
+        let spread = if passed { spread } else { spread.max(self.bound) };
+        self.before = self.last.filter(|&(n, _)| n != triangles).or(self.before);
+        self.last = Some((triangles, spread));
+    }
+
+    /// Where the bound is met: distances fall with some power of the number of triangles, the first if nothing else is known.
+    fn guess(&self) -> f64 {
+        let Some((n, d)) = self.last else { return self.all as f64 };
+        let power = self.before.map_or(1.0, |(m, e)| (e / d).ln() / (n as f64 / m as f64).ln());
+        let power = if power.is_finite() { power.clamp(0.6, 2.0) } else { 1.0 };
+        SAFE * n as f64 * (d / self.bound).max(1e-6).powf(1.0 / power)
+    }
+
+    /// The number to try next; `None` when the search is over.
+    fn next(&mut self) -> Option<usize> {
+        let guess = self.guess();
+        // Inside by so much that the search is over if it is as guessed.
+        let step = 0.1 + 0.9 * CLOSE;
+        let next = match (self.high, self.low) {
+            (Some(h), _) if h <= self.floor => return None,
+            (_, Some(l)) if l >= self.all => return None,
+            (Some(h), Some(l)) => {
+                let ratio = h as f64 / l as f64;
+                if ratio <= CLOSE || h <= l + 1 {
+                    return None;
+                }
+                let slow = ratio.ln() > 0.5 * self.ratio.ln();
+                self.ratio = ratio;
+                let (lo, hi) = (l as f64 * step, h as f64 / step);
+                if slow || lo >= hi { (h as f64 * l as f64).sqrt() } else { guess.clamp(lo, hi) }
+            }
+            (Some(h), None) => guess.clamp(h as f64 / DOWN, h as f64 / step),
+            (None, Some(l)) => {
+                let least = (1.0 + 0.15 * f64::from(self.raised)).min(UP);
+                guess.clamp(l as f64 * least, l as f64 * UP)
+            }
+            (None, None) => return None,
+        };
+        let (least, most) = (self.low.map_or(self.floor, |l| l + 1), self.high.map_or(self.all, |h| h - 1));
+        Some((next.round() as usize).clamp(self.floor.max(least.min(most)), most.max(self.floor)))
     }
 }

@@ -105,7 +105,7 @@ impl CertifyOptions {
         CertifyOptions { tolerance, ..Default::default() }
     }
 
-    fn check(&self) -> Result<(), MeasureError> {
+    pub(super) fn check(&self) -> Result<(), MeasureError> {
         let value = self.tolerance;
         if value.is_finite() && value >= 0.0 {
             return Ok(());
@@ -180,7 +180,7 @@ pub fn within(
     })
 }
 
-fn progress<'a>(a: &Surface, b: &Surface, control: &'a dyn Control) -> Progress<'a> {
+pub(super) fn progress<'a>(a: &Surface, b: &Surface, control: &'a dyn Control) -> Progress<'a> {
     let work = |s: &Surface| s.points.len() + s.triangles.len();
     Progress::new(control, work(a) + work(b))
 }
@@ -236,7 +236,7 @@ fn one_sided(
     let tolerance = (options.tolerance * scale - 4.0 * slack).max(64.0 * slack);
     let (enough, too_much) = (goal.enough * scale - 2.0 * slack, goal.too_much * scale + slack);
     let corners = corners(a, b, progress)?;
-    let pair = Pair { a, b, shift, same: b.same_places() };
+    let pair = Pair::new(a, b);
     let mut witness = first_witness(a, b, &shift, &corners);
     // Above what bounds have to come down.
     let target = |w: &Witness| (w.lower + tolerance).max(enough);
@@ -247,16 +247,6 @@ fn one_sided(
         let dropped;
         (pieces, dropped) = pair.first_pieces(&corners, witness.lower, target(&witness), progress)?;
         upper = upper.max(dropped);
-    }
-    if std::env::var("DBG").is_ok() {
-        eprintln!(
-            "first {} of {} lower {:.3e} wanted {:.3e} boundmax {:.3e}",
-            pieces.len(),
-            a.triangles.len(),
-            witness.lower,
-            target(&witness),
-            pieces.iter().fold(0f64, |t, p| t.max(p.bound))
-        );
     }
     // Bounds come down to a level, which comes down to what is wanted: what is above a level has to be cut whatever the final witness
     // is, as long as that is below the level.
@@ -269,13 +259,6 @@ fn one_sided(
             level = wanted;
         }
         let goal = Level { level, wanted, lower: witness.lower, tolerance };
-        if std::env::var("DBG").is_ok() {
-            eprintln!(
-                "level {level:.3e} wanted {wanted:.3e} pieces {} above {} cuts {cuts}",
-                pieces.len(),
-                pieces.iter().filter(|p| p.bound > level).count()
-            );
-        }
         let (above, rest): (Vec<Piece>, Vec<Piece>) = pieces.drain(..).partition(|p| p.bound > level);
         let shares: Vec<Result<Share, MeasureError>> = parallel::map_init_chunks(
             &above,
@@ -317,14 +300,14 @@ fn one_sided(
 }
 
 /// The allowance for rounding in the frame of the other surface: see above.
-fn slack(a: &Surface, shift: &Shift) -> f64 {
+pub(super) fn slack(a: &Surface, shift: &Shift) -> f64 {
     let (lo, hi) = a.bounds();
     let reach = [lo, hi].map(|p| shift.apply(a.frame.local(p)).abs().max_element());
     1024.0 * f64::EPSILON / 2.0 * reach[0].max(reach[1]).max(1.0)
 }
 
 /// What of `b` is nearest to the vertices of `a`.
-fn corners(a: &Surface, b: &Surface, progress: &Progress<'_>) -> Result<Vec<Best>, MeasureError> {
+pub(super) fn corners(a: &Surface, b: &Surface, progress: &Progress<'_>) -> Result<Vec<Best>, MeasureError> {
     let parts = over_vertices(a, b, progress, |found: &mut Vec<Best>, _, best| found.push(*best))?;
     Ok(parts.into_iter().flatten().collect())
 }
@@ -438,18 +421,22 @@ impl Level {
 }
 
 /// From which surface to which.
-struct Pair<'a> {
+pub(super) struct Pair<'a> {
     a: &'a Surface,
     b: &'a Surface,
-    shift: Shift,
+    pub(super) shift: Shift,
     /// What [`Surface::same_places`] says of `b`.
-    same: Vec<u32>,
+    pub(super) same: Vec<u32>,
 }
 
-impl Pair<'_> {
+impl<'a> Pair<'a> {
+    pub(super) fn new(a: &'a Surface, b: &'a Surface) -> Self {
+        Pair { a, b, shift: a.frame.to(&b.frame), same: b.same_places() }
+    }
+
     /// All triangles of `a` whose bound is above `enough`, as pieces; and the greatest bound of the others. Bounds below `lower` are of no
     /// interest.
-    fn first_pieces(
+    pub(super) fn first_pieces(
         &self,
         corners: &[Best],
         lower: f64,

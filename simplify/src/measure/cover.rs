@@ -13,6 +13,7 @@
 
 use super::bvh::{down, up};
 use super::pieces::Piece;
+use super::query::greatest;
 use super::surface::Surface;
 use super::triangle;
 use glam::{DVec2, DVec3};
@@ -22,6 +23,8 @@ const MOST: usize = 48;
 /// Twice the area over the square of the longest side below which the slope of a plane is not relied upon: reaching as far out as the other
 /// surface does, it would be off by 4e-16 over this.
 const THIN: f64 = 0.1;
+/// Closer than this, surfaces of size 1 are the same to rounding.
+const TOUCHING: f64 = 1e-13;
 /// Cells reach beyond the piece by this part of the greatest coordinate, more than rounding.
 const MARGIN: f64 = 1e-14;
 
@@ -141,6 +144,15 @@ impl<'a> Cover<'a> {
         let height = ground.map(|g| g.1);
         let ground = Ground { at, height, double_area: stout(&at, &height)?, axes: [u, w, up], origin };
         self.gather(piece, reach, &ground, project)?;
+        if piece.d.iter().all(|&d| d <= TOUCHING) {
+            // Surfaces that are the same there: a single triangle may have it all.
+            let whole =
+                self.seen.iter().map(|t| greatest(b.corners(t.id as usize), &piece.corners, f64::INFINITY));
+            let whole = whole.fold(f64::INFINITY, f64::min).sqrt();
+            if whole <= TOUCHING {
+                return Some(whole);
+            }
+        }
         let middle = Middle::new(&ground);
         let all = self.covers(&ground, &middle).then(|| self.worst(&ground, enough));
         let bound = match all {
@@ -316,11 +328,10 @@ fn cell(b: &Surface, t: &Seen, ground: &Ground, enough: f64) -> f64 {
 /// The part of a triangle over the piece (Sutherland & Hodgman 1974): corners in the plane, and heights.
 fn clip(t: &Seen, ground: &Ground) -> ([(DVec2, f64); 6], usize) {
     let size = t.at.iter().chain(&ground.at).map(|p| p.abs().max_element()).fold(0.0, f64::max);
+    let start: [(DVec2, f64); 3] = std::array::from_fn(|k| (t.at[k], t.height[k]));
     let mut polygon = [(DVec2::ZERO, 0.0); 6];
+    polygon[..3].copy_from_slice(&start);
     let mut n = 3;
-    for k in 0..3 {
-        polygon[k] = (t.at[k], t.height[k]);
-    }
     for k in 0..3 {
         let (from, to) = (ground.at[k], ground.at[(k + 1) % 3]);
         let along = to - from;

@@ -1,7 +1,7 @@
 //! How far normals, texture coordinates and colours of two surfaces are from each other, at closest points.
 
 use super::MeasureError;
-use super::distance::{DistanceOptions, over_samples};
+use super::distance::{self, DistanceOptions, Distances, over_samples};
 use super::progress::Progress;
 use super::query::Best;
 use super::sample::{Sample, Sampler};
@@ -130,31 +130,76 @@ pub fn deviations(
     control: &dyn Control,
 ) -> Result<Deviations, MeasureError> {
     options.check()?;
-    for (surface, values) in [(a, of_a), (b, of_b)] {
-        for v in values {
-            let want = 3 * v.width * surface.triangle_count();
-            if v.width == 0 || v.values.len() != want {
-                let range = "3 times the width for every triangle";
-                let value = v.values.len() as f64;
-                return Err(MeasureError::Range { option: "length of values", value, range });
-            }
-        }
-    }
-    let pairs: Vec<[&CornerValues; 2]> =
-        of_a.iter().filter_map(|x| of_b.iter().find(|y| y.semantic == x.semantic).map(|y| [x, y])).collect();
-    let turned: Vec<[&CornerValues; 2]> = pairs.iter().map(|&[x, y]| [y, x]).collect();
+    let pairs = Pairs::new((a, of_a), (b, of_b))?;
     parallel::with_threads(options.threads, || {
         let progress = Progress::new(control, 2 * options.samples);
-        let to = one_sided(a, b, &pairs, options, &progress)?;
-        let fro = one_sided(b, a, &turned, options, &progress)?;
-        let mut both = to.into_iter().zip(fro).map(|(to, fro)| TwoSided {
+        let one_sided = |a: &Surface, b: &Surface, pairs: &[[&CornerValues; 2]]| {
+            let sampler = Sampler::new(a, options.samples, options.seed);
+            over_samples(a, b, &sampler, &progress, visit(a, b, pairs))
+        };
+        let to = one_sided(a, b, &pairs.ahead)?;
+        let fro = one_sided(b, a, &pairs.back)?;
+        Ok(pairs.deviations(to, fro))
+    })
+}
+
+/// [`distance`](super::distance()) and [`deviations`] at once: their samples are the same, so the closest points are looked for only once.
+///
+/// Errors: as those.
+pub fn distance_and_deviations(
+    (a, of_a): (&Surface, &[CornerValues]),
+    (b, of_b): (&Surface, &[CornerValues]),
+    options: &DistanceOptions,
+    control: &dyn Control,
+) -> Result<(Distances, Deviations), MeasureError> {
+    options.check()?;
+    let pairs = Pairs::new((a, of_a), (b, of_b))?;
+    parallel::with_threads(options.threads, || {
+        let progress = Progress::new(control, 2 * options.samples + a.points.len() + b.points.len());
+        let (a_to_b, to) = distance::one_sided(a, b, options, &progress, visit(a, b, &pairs.ahead))?;
+        let (b_to_a, fro) = distance::one_sided(b, a, options, &progress, visit(b, a, &pairs.back))?;
+        Ok((Distances::new(a_to_b, b_to_a, a.diagonal()), pairs.deviations(to, fro)))
+    })
+}
+
+/// The values that both surfaces have: those of A first, then those of B first.
+struct Pairs<'a> {
+    ahead: Vec<[&'a CornerValues; 2]>,
+    back: Vec<[&'a CornerValues; 2]>,
+}
+
+impl<'a> Pairs<'a> {
+    fn new(
+        (a, of_a): (&Surface, &'a [CornerValues]),
+        (b, of_b): (&Surface, &'a [CornerValues]),
+    ) -> Result<Self, MeasureError> {
+        for (surface, values) in [(a, of_a), (b, of_b)] {
+            for v in values {
+                let want = 3 * v.width * surface.triangle_count();
+                if v.width == 0 || v.values.len() != want {
+                    let range = "3 times the width for every triangle";
+                    let value = v.values.len() as f64;
+                    return Err(MeasureError::Range { option: "length of values", value, range });
+                }
+            }
+        }
+        let other = |x: &CornerValues| of_b.iter().find(|y| y.semantic == x.semantic);
+        let ahead: Vec<_> = of_a.iter().filter_map(|x| other(x).map(|y| [x, y])).collect();
+        let back = ahead.iter().map(|&[x, y]| [y, x]).collect();
+        Ok(Pairs { ahead, back })
+    }
+
+    fn deviations(&self, to: Vec<Vec<Sum>>, fro: Vec<Vec<Sum>>) -> Deviations {
+        let n = self.ahead.len() + 1;
+        let mut both = total(to, n).into_iter().zip(total(fro, n)).map(|(to, fro)| TwoSided {
             a_to_b: to,
             b_to_a: fro,
             worse: to.worse(fro),
         });
         let normals = both.next().unwrap_or_default();
-        Ok(Deviations { normals, values: pairs.iter().map(|p| p[0].semantic.clone()).zip(both).collect() })
-    })
+        let semantics = self.ahead.iter().map(|p| p[0].semantic.clone());
+        Deviations { normals, values: semantics.zip(both).collect() }
+    }
 }
 
 /// Sums over samples.
@@ -175,16 +220,13 @@ impl Sum {
     }
 }
 
-/// Of the normals, then of all pairs of values.
-fn one_sided(
-    a: &Surface,
-    b: &Surface,
-    pairs: &[[&CornerValues; 2]],
-    options: &DistanceOptions,
-    progress: &Progress<'_>,
-) -> Result<Vec<Deviation>, MeasureError> {
-    let sampler = Sampler::new(a, options.samples, options.seed);
-    let visit = |sums: &mut Vec<Sum>, s: &Sample, best: &Best| {
+/// Adds up what the samples of `a` say: of the normals, then of all pairs of values.
+fn visit<'a>(
+    a: &'a Surface,
+    b: &'a Surface,
+    pairs: &'a [[&CornerValues; 2]],
+) -> impl Fn(&mut Vec<Sum>, &Sample, &Best) + Sync + Send + 'a {
+    move |sums, s, best| {
         sums.resize(pairs.len() + 1, Sum::default());
         let angle = angle(a.normal(s.triangle), b.normal(best.triangle)).to_degrees();
         sums[0].add(angle * angle);
@@ -193,9 +235,12 @@ fn one_sided(
             let difference = |k| x.at(t, s.v, s.w, k) - y.at(u, best.foot.v, best.foot.w, k);
             sum.add((0..x.width.min(y.width)).map(|k| difference(k).powi(2)).sum());
         }
-    };
-    let chunks = over_samples(a, b, &sampler, progress, visit)?;
-    let mut all = vec![Sum::default(); pairs.len() + 1];
+    }
+}
+
+/// All chunks together.
+fn total(chunks: Vec<Vec<Sum>>, n: usize) -> Vec<Deviation> {
+    let mut all = vec![Sum::default(); n];
     for chunk in chunks {
         for (sum, part) in all.iter_mut().zip(chunk) {
             sum.squares += part.squares;
@@ -208,7 +253,7 @@ fn one_sided(
         max: s.max.sqrt(),
         samples: s.samples,
     };
-    Ok(all.into_iter().map(deviation).collect())
+    all.into_iter().map(deviation).collect()
 }
 
 /// The angle between two vectors, exact for small ones too; NaN if one is zero.

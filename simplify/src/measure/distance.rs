@@ -148,6 +148,10 @@ pub struct Distances {
 }
 
 impl Distances {
+    pub(super) fn new(a_to_b: OneSided, b_to_a: OneSided, diagonal: f64) -> Self {
+        Distances { a_to_b, b_to_a, worse: a_to_b.summary.worse(&b_to_a.summary), diagonal }
+    }
+
     /// The worse of both, relative to A's diagonal; `None` if A is a single point.
     pub fn relative(&self) -> Option<Summary> {
         (self.diagonal > 0.0).then(|| self.worse.scaled(1.0 / self.diagonal))
@@ -169,10 +173,9 @@ pub fn distance(
     options.check()?;
     parallel::with_threads(options.threads, || {
         let progress = Progress::new(control, 2 * options.samples + a.points.len() + b.points.len());
-        let a_to_b = one_sided(a, b, options, &progress)?;
-        let b_to_a = one_sided(b, a, options, &progress)?;
-        let worse = a_to_b.summary.worse(&b_to_a.summary);
-        Ok(Distances { a_to_b, b_to_a, worse, diagonal: a.diagonal() })
+        let (a_to_b, _) = one_sided(a, b, options, &progress, |_: &mut (), _, _| ())?;
+        let (b_to_a, _) = one_sided(b, a, options, &progress, |_: &mut (), _, _| ())?;
+        Ok(Distances::new(a_to_b, b_to_a, a.diagonal()))
     })
 }
 
@@ -252,22 +255,27 @@ fn farther(far: &mut Far, sample: &Sample, best: &Best) {
     }
 }
 
-fn one_sided(
+/// The distance from `a` to `b`; calls `also` for every sample, too: what became of each chunk, in order.
+pub(super) fn one_sided<T: Default + Send>(
     a: &Surface,
     b: &Surface,
     options: &DistanceOptions,
     progress: &Progress<'_>,
-) -> Result<OneSided, MeasureError> {
+    also: impl Fn(&mut T, &Sample, &Best) + Sync + Send,
+) -> Result<(OneSided, Vec<T>), MeasureError> {
     #[derive(Default)]
-    struct Chunk {
+    struct Chunk<T> {
         d: Vec<f64>,
         far: Far,
+        more: T,
     }
     let sampler = Sampler::new(a, options.samples, options.seed);
-    let chunks = over_samples(a, b, &sampler, progress, |c: &mut Chunk, s, best| {
+    let chunks = over_samples(a, b, &sampler, progress, |c: &mut Chunk<T>, s, best| {
         c.d.push(best.foot.d2.sqrt());
         farther(&mut c.far, s, best);
+        also(&mut c.more, s, best);
     })?;
+    let mut more = Vec::with_capacity(chunks.len());
     let mut far = None;
     let mut all = Vec::with_capacity(options.samples);
     let (mut sum, mut squares) = (0.0, 0.0);
@@ -275,6 +283,7 @@ fn one_sided(
         sum += c.d.iter().sum::<f64>();
         squares += c.d.iter().map(|d| d * d).sum::<f64>();
         all.extend(c.d);
+        more.push(c.more);
         c.far.iter().for_each(|(s, best)| farther(&mut far, s, best));
     }
     // A vertex as a sample of a triangle that has it.
@@ -314,7 +323,7 @@ fn one_sided(
         mean: sum / n,
         quantiles: quantiles(&mut all),
     };
-    Ok(OneSided {
+    let found = OneSided {
         summary: summary.scaled(per),
         farthest: Farthest {
             point: a.frame.world(a.point_on(sample.triangle, sample.v, sample.w)),
@@ -325,7 +334,8 @@ fn one_sided(
         },
         samples: options.samples,
         vertices: a.points.len(),
-    })
+    };
+    Ok((found, more))
 }
 
 /// By nearest rank. Leaves `d` in another order. O(n).

@@ -2,7 +2,7 @@
 //!
 //! [`Surface`] holds triangles of any kind and answers [closest-point queries](Surface::query). [`distance()`] compares two of them after
 //! Metro (Cignoni, Rocchini & Scopigno 1998): by samples, in both directions; [`vertex_distances`] gives the distance of every vertex,
-//! for heat maps. [`certify`] proves an interval of the Hausdorff distance, [`within`] decides whether it is below a bound.
+//! for heat maps. [`certify`] proves an interval of the Hausdorff distance, [`within`] decides whether it is below a bound, [`exceeding`] finds all places where it is not.
 //! [`deviations`] compares normals, texture coordinates and colours at closest points; [`turned_triangles`], [`self_intersections`],
 //! [`triangle_quality`] and [`TopologySummary`] look at what else may have gone wrong.
 //!
@@ -31,6 +31,7 @@ mod cover;
 mod deviation;
 mod distance;
 mod error;
+mod exceeding;
 mod intersections;
 mod pieces;
 mod progress;
@@ -41,11 +42,14 @@ mod surface;
 pub(crate) mod triangle;
 
 pub use certify::{Certified, CertifyOptions, Interval, Within, certify, within};
-pub use deviation::{CornerValues, Deviation, Deviations, TwoSided, deviations, turned_triangles};
+pub use deviation::{
+    CornerValues, Deviation, Deviations, TwoSided, deviations, distance_and_deviations, turned_triangles,
+};
 pub use distance::{
     DistanceOptions, Distances, Farthest, OneSided, Quantiles, Summary, distance, vertex_distances,
 };
 pub use error::MeasureError;
+pub use exceeding::{Exceeding, Place, exceeding};
 pub use intersections::{SelfIntersections, self_intersections};
 pub use query::{ClosestPoint, Query};
 pub use shape::{TopologySummary, TriangleQuality, triangle_quality};
