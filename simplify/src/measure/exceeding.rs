@@ -144,7 +144,7 @@ impl Side<'_> {
         if places.len() > limit {
             return Ok((f64::INFINITY, places));
         }
-        type Share = Result<(f64, Vec<Piece>), MeasureError>;
+        type Share = Result<(f64, Vec<Box<Piece>>), MeasureError>;
         let shares: Vec<Share> = parallel::map_init_chunks(
             &open,
             SHARE,
@@ -165,7 +165,7 @@ impl Side<'_> {
         for share in shares {
             let (bound, found) = share?;
             upper = upper.max(bound);
-            places.extend(found.iter().map(place));
+            places.extend(found.iter().map(|piece| place(piece)));
         }
         Ok(((upper + slack) / scale, places))
     }
@@ -178,13 +178,13 @@ fn prove(
     cover: &mut Cover<'_>,
     piece: &Piece,
     [near, enough]: [f64; 2],
-) -> Result<f64, Piece> {
+) -> Result<f64, Box<Piece>> {
     let (mut dropped, mut cuts) = (0f64, 0);
     let mut stack = vec![*piece];
     while let Some(piece) = stack.pop() {
         cuts += 1;
         if piece.depth >= DEPTH || cuts > QUOTA {
-            return Err(piece);
+            return Err(Box::new(piece));
         }
         let mut far = None;
         piece.cut(b, query, |mut part| {
@@ -202,7 +202,7 @@ fn prove(
             }
         });
         if let Some(far) = far {
-            return Err(far);
+            return Err(Box::new(far));
         }
     }
     Ok(dropped)
