@@ -133,7 +133,7 @@ fn sheet(n: u32, z: f64, bend: f64, bumps: &[f64], skip: Option<u32>, soup: bool
         [r * angle.sin(), y, 1.0 / bend.max(1e-3) - r * angle.cos()]
     };
     let mut triangles: Vec<[u32; 3]> = (0..n * n)
-        .filter(|&i| skip != Some(i))
+        .filter(|&i| n == 1 || skip != Some(i))
         .flat_map(|i| {
             let a = i / n * m + i % n;
             [[a, a + 1, a + m + 1], [a, a + m + 1, a + m]]
