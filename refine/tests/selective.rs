@@ -1,57 +1,22 @@
 //! View-dependent refinement: legal moves, the least closed set, bounds that hold.
 
+mod common;
+
+use common::{NAMES, options, sample};
 use glam::{DMat4, DVec3};
-use progmesh_meshes::{GenerateOptions, Sample, generate};
 use progmesh_refine::aif::*;
 use progmesh_refine::hierarchy::{Hierarchy, Options as HierarchyOptions};
 use progmesh_refine::progressive::build;
 use progmesh_refine::selective::{Cull, Lens, Limits, View};
 use progmesh_refine::simplify::measure::Surface;
-use progmesh_refine::simplify::{Method, Options, Placement, Quiet};
+use progmesh_refine::simplify::{Method, Placement, Quiet};
 use progmesh_refine::view::{Camera, CameraParameters, Projection};
 use progmesh_refine::{Cursor, ProgressiveMesh};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// The sample with normals and uvs as wedges, shared where their values are.
-fn mesh_of(s: &Sample) -> Mesh {
-    let mut input = MeshInput {
-        positions: Positions::from_f64(s.positions.clone()),
-        face_sizes: s.face_sizes.clone(),
-        corners: s.corners.clone(),
-        wires: s.wires.clone(),
-        face_material: s.face_material.clone(),
-        ..Default::default()
-    };
-    if let Some(n) = &s.normals {
-        let mut channels = vec![Channel::new(Semantic::Normal, 3)];
-        s.uvs.iter().for_each(|_| channels.push(Channel::new(Semantic::TexCoord(0), 2)));
-        let all = (1 << channels.len()) - 1;
-        let mut w = Wedges::new(channels).unwrap();
-        let mut known = HashMap::new();
-        for c in 0..s.corners.len() {
-            let uv = s.uvs.as_ref().map(|u| u.corner[c]);
-            let id = *known.entry((n.corner[c], uv)).or_insert_with(|| {
-                let mut row = n.values[n.corner[c] as usize].to_vec();
-                s.uvs.iter().for_each(|u| row.extend(u.values[u.corner[c] as usize]));
-                w.push(&row, all)
-            });
-            w.corner.push(id);
-        }
-        input.wedges = Some(w);
-    }
-    Mesh::build(input, &BuildOptions::default()).unwrap().0
-}
-
-/// Closed, bordered, of several components, terrain, with seams and materials, not manifold.
-const NAMES: [&str; 8] =
-    ["sphere", "torus", "scan", "terrain", "polygons", "quad-sphere", "cad", "nonmanifold"];
-
 fn progressive(name: &str, faces: usize, method: Method, placement: Option<Placement>) -> ProgressiveMesh {
-    let sample = generate(name, &GenerateOptions::default().with_faces(faces).with_seed(5)).unwrap();
-    let mut o = Options::default();
-    (o.method, o.placement) = (method, placement);
-    build(mesh_of(&sample), &o, &Quiet).unwrap().mesh
+    build(sample(name, faces, 5), &options(method, placement), &Quiet).unwrap().mesh
 }
 
 fn hierarchy(name: &str, faces: usize) -> Arc<Hierarchy> {

@@ -106,11 +106,20 @@ impl CertifyOptions {
     }
 
     pub(super) fn check(&self) -> Result<(), MeasureError> {
-        let value = self.tolerance;
-        if value.is_finite() && value >= 0.0 {
-            return Ok(());
-        }
-        Err(MeasureError::Range { option: "tolerance", value, range: "finite and not negative" })
+        not_negative("tolerance", self.tolerance)
+    }
+
+    /// Checks the options and the bound that goes with them.
+    pub(super) fn check_with(&self, bound: f64) -> Result<(), MeasureError> {
+        self.check()?;
+        not_negative("bound", bound)
+    }
+}
+
+fn not_negative(option: &'static str, value: f64) -> Result<(), MeasureError> {
+    match value.is_finite() && value >= 0.0 {
+        true => Ok(()),
+        false => Err(MeasureError::Range { option, value, range: "finite and not negative" }),
     }
 }
 
@@ -160,11 +169,7 @@ pub fn within(
     options: &CertifyOptions,
     control: &dyn Control,
 ) -> Result<Within, MeasureError> {
-    options.check()?;
-    if !bound.is_finite() || bound < 0.0 {
-        let range = "finite and not negative";
-        return Err(MeasureError::Range { option: "bound", value: bound, range });
-    }
+    options.check_with(bound)?;
     parallel::with_threads(options.threads, || {
         let progress = progress(a, b, control);
         let goal = Goal { enough: bound, too_much: bound };

@@ -62,11 +62,7 @@ pub fn exceeding(
     options: &CertifyOptions,
     control: &dyn Control,
 ) -> Result<Exceeding, MeasureError> {
-    options.check()?;
-    if !bound.is_finite() || bound < 0.0 {
-        let range = "finite and not negative";
-        return Err(MeasureError::Range { option: "bound", value: bound, range });
-    }
+    options.check_with(bound)?;
     parallel::with_threads(options.threads, || {
         let progress = progress(a, b, control);
         let nearest = [corners(a, b, &progress)?, corners(b, a, &progress)?];
