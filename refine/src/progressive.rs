@@ -10,6 +10,7 @@ mod attributes;
 mod build;
 mod cursor;
 mod fans;
+mod fetch;
 mod input;
 pub(crate) mod links;
 mod order;

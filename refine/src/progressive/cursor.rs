@@ -2,6 +2,7 @@
 
 use super::attributes::{Explicit, WedgeState};
 use super::fans::{Fans, Opening};
+use super::fetch;
 use super::links::{Half, link_faces};
 use super::{ProgressiveMesh, SplitKind, seam_wedges};
 use crate::aif::{MeshInput, NONE, Positions, Wedges};
@@ -194,10 +195,18 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
     pub fn seek(&mut self, position: usize) -> Result<(), Damage> {
         let position = position.min(self.source.splits.len());
         while self.position < position {
-            self.refine()?;
+            let end = position.min(self.position + fetch::BATCH);
+            fetch::splits(&self.source.splits, self.position..end, &self.fans, &self.positions);
+            while self.position < end {
+                self.refine()?;
+            }
         }
         while self.position > position {
-            self.coarsen();
+            let end = position.max(self.position.saturating_sub(fetch::BATCH));
+            fetch::collapses(&self.source.splits, end..self.position, &self.fans, &self.positions);
+            while self.position > end {
+                self.coarsen();
+            }
         }
         Ok(())
     }
@@ -206,16 +215,17 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
     ///
     /// Errors: as [`Cursor::seek`].
     pub fn seek_faces(&mut self, faces: usize) -> Result<(), Damage> {
-        while self.position > 0 && self.face_count() > faces {
-            self.coarsen();
+        let (code, mut position, mut now) = (&self.source.splits.code, self.position, self.face_count());
+        let made_by = |i: usize| 1 + code[i].two_faces() as usize;
+        while position > 0 && now > faces {
+            position -= 1;
+            now -= made_by(position);
         }
-        while let Some(code) = self.source.splits.code.get(self.position) {
-            if self.face_count() + 1 + code.two_faces() as usize > faces {
-                break;
-            }
-            self.refine()?;
+        while position < code.len() && now + made_by(position) <= faces {
+            now += made_by(position);
+            position += 1;
         }
-        Ok(())
+        self.seek(position)
     }
 
     /// To the finest mesh of at most this many vertices, or the base.
