@@ -72,6 +72,13 @@ impl Mesh {
         self.to_input_with_map().0
     }
 
+    /// The wedges of [`Mesh::to_input`] alone. O(n).
+    pub fn input_wedges(&self) -> Option<Wedges> {
+        let t = &self.topology;
+        let slots = t.faces().flat_map(|f| t.corner_range(f));
+        self.wedges.as_ref().map(|w| by_first_use(w, slots, w.corner.len()))
+    }
+
     /// As [`Mesh::to_input`], with the map of vertex slots to the vertices of the result ([`NONE`] for removed ones).
     pub fn to_input_with_map(&self) -> (MeshInput, Vec<u32>) {
         let t = &self.topology;

@@ -5,7 +5,7 @@ use crate::options::{Control, Level, Method, Options, SimplifyError, Stop};
 use crate::work::wedge_at;
 use crate::{nsa, quadric_collapse};
 use glam::DVec3;
-use progmesh_aif::{CollapseRecord, EdgeId, FaceId, Mesh, NONE, Topology, VertexId, Wedges};
+use progmesh_aif::{CollapseRecord, EdgeId, EdgeUse, FaceId, Mesh, NONE, Topology, VertexId, Wedges};
 
 /// A triangle that a collapse removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -186,10 +186,14 @@ pub(crate) fn note_wedges(
     values: &mut Vec<f32>,
 ) {
     let t = mesh.topology();
-    for f in t.vertex_faces(removed) {
-        let start = t.corner_range(f).start;
-        if let Some(i) = t.face_vertices(f).position(|v| v == removed) {
-            corners.push(((start + i) as u32, wedges.corner[start + i]));
+    for &side in t.star(removed) {
+        for &f in t.edge_faces(side) {
+            // Each face once, by the side that begins at the vertex.
+            let begins = |&u: &EdgeUse| u.edge() == side && t.origin(u) == removed;
+            if let Some(i) = t.face_edges(f).iter().position(begins) {
+                let c = t.corner_range(f).start + i;
+                corners.push((c as u32, wedges.corner[c]));
+            }
         }
     }
     let first = rows.len();

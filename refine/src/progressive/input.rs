@@ -81,26 +81,27 @@ impl InputOrder {
         })
     }
 
-    /// Compares the wedges of `full`, which stands at full detail, with the input's.
-    pub(super) fn note_wedges(&mut self, full: &Cursor<&ProgressiveMesh>, input: &Wedges) {
-        let mut of_slot: Vec<Option<u32>> = vec![None; full.wedge_count()];
+    /// Compares the wedges of `full`, the triangles at full detail, with the input's; `slot` is the slot of every wedge of `full`.
+    pub(super) fn note_wedges(&mut self, full: &Wedges, slot: &[u32], input: &Wedges) {
+        let slots = slot.iter().filter(|s| **s != NONE).count();
+        let mut of_slot: Vec<Option<u32>> = vec![None; slots];
         let mut source = vec![NONE; input.len()];
-        let slots: Vec<u32> = self.corner_slots().map(|(f, k)| full.indices()[f][k]).collect();
-        for (c, (&w, s)) in input.corner.iter().zip(slots).enumerate() {
-            let of = *of_slot[s as usize].get_or_insert(w);
+        for (c, &w) in input.corner.iter().enumerate() {
+            let m = full.corner[self.polygons.as_ref().map_or(c, |p| p.corners[c] as usize)];
+            let of = *of_slot[slot[m as usize] as usize].get_or_insert(w);
             if of != w {
                 self.corner_wedges.push((c as u32, w));
             }
             if w != NONE {
-                source[w as usize] = s;
+                source[w as usize] = m;
             }
         }
         self.wedge = of_slot.into_iter().map(|w| w.unwrap_or(NONE)).collect();
-        for (w, &s) in source.iter().enumerate() {
+        for (w, &m) in source.iter().enumerate() {
             let row = input.row(w as u32);
-            let same = s != NONE
-                && full.present(s) == input.present(w as u32)
-                && full.row(s).iter().zip(row).all(|(a, b)| a.to_bits() == b.to_bits());
+            let same = m != NONE
+                && full.present(m) == input.present(w as u32)
+                && full.row(m).iter().zip(row).all(|(a, b)| a.to_bits() == b.to_bits());
             if !same {
                 self.rows.push((w as u32, input.present(w as u32)));
                 self.values.extend_from_slice(row);
