@@ -5,9 +5,11 @@ mod leftover;
 pub use leftover::Leftover;
 
 use crate::pipeline::world_scales;
+use crate::refine::hierarchy::{self, Bounds};
 use crate::refine::progressive::Damage;
 use crate::refine::{Geomorph, GeomorphError, ProgressiveMesh};
 use crate::scene::Scene;
+use std::sync::Arc;
 
 /// A scene with progressive meshes in place of its meshes.
 #[derive(Clone, Debug, Default)]
@@ -102,6 +104,16 @@ impl ProgressiveScene {
             at[m as usize] += 1;
         }
         at
+    }
+
+    /// Measures the bounds of all meshes that have none, and keeps them there: for view-dependent refinement, and for files of them.
+    ///
+    /// Errors: the number of a mesh, and what is damaged in it.
+    pub fn measure_bounds(&mut self, options: &hierarchy::Options) -> Result<(), (usize, Damage)> {
+        for (i, mesh) in self.meshes.iter_mut().enumerate().filter(|(_, m)| m.bounds.is_none()) {
+            mesh.bounds = Some(Arc::new(Bounds::measure(mesh, options).map_err(|e| (i, e))?));
+        }
+        Ok(())
     }
 
     /// The scene with so many splits of every mesh applied; in the order of the input, if that is known. O(n).

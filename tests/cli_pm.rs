@@ -210,6 +210,29 @@ fn chunks_for_random_access_bring_the_same_mesh() {
 }
 
 #[test]
+fn bounds_in_the_file_are_what_extract_goes_by() {
+    let p = Place::new();
+    p.generate("scan", "in.ply", 2000);
+    p.done("encode in.ply in.pm -q");
+    let told = p.done("encode in.ply bounded.pm --bounds --json").json();
+    assert!(told["seconds"]["bounds"].as_f64().unwrap() > 0.0);
+    let bytes = p.done("info bounded.pm --json").json()["progressive"]["streams"]["bounds"].as_u64().unwrap();
+    let (more, splits) =
+        (p.read("bounded.pm").len() - p.read("in.pm").len(), told["splits"].as_u64().unwrap());
+    assert!(bytes >= 3 * splits && bytes < 8 * splits && more as u64 > bytes && more as u64 - bytes < 1000);
+    p.done("decode in.pm a.ply -q");
+    p.done("decode bounded.pm b.ply -q");
+    assert!(p.read("a.ply") == p.read("b.ply"));
+    p.write(
+        "cam.json",
+        br#"{"eye":[0,0,4],"target":[0,0,0],"up":[0,1,0],"fov_y_deg":45,"width":640,"height":480,"near":0.01,"far":40}"#,
+    );
+    let extracted = p.done("extract bounded.pm near.ply --camera cam.json --tau 0.5 --json").json();
+    let [some, all] = ["faces", "full_faces"].map(|k| extracted[k].as_u64().unwrap());
+    assert!(some > 20 && some < all, "{some} of {all}");
+}
+
+#[test]
 fn info_tells_where_the_bytes_go() {
     let p = Place::new();
     p.generate("scan", "in.ply", 2000);

@@ -328,6 +328,7 @@ struct Streams {
     faces: u64,
     order: u64,
     scene: u64,
+    bounds: u64,
     other: u64,
 }
 
@@ -473,6 +474,7 @@ struct EncodeSeconds {
     read: f64,
     build: f64,
     simplify: f64,
+    bounds: f64,
     encode: f64,
     write: f64,
     total: f64,

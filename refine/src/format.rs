@@ -11,6 +11,7 @@
 
 mod assembly;
 mod base;
+mod bounds;
 mod coder;
 mod connect;
 mod container;

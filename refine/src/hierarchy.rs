@@ -12,11 +12,14 @@
 //! the way they nest are proven.
 
 mod bounds;
+mod cone;
 mod deviation;
 mod forest;
+mod spheres;
 
-pub use bounds::SplitBounds;
-pub(crate) use bounds::{Bounds, Cone, unpack};
+pub use bounds::{Bounds, Guarantee, SplitBounds};
+pub(crate) use bounds::{Packed, unpack};
+pub(crate) use cone::Cone;
 pub(crate) use forest::Forest;
 
 use crate::progressive::{Damage, ProgressiveMesh};
@@ -47,24 +50,62 @@ impl Default for Options {
 pub struct Hierarchy {
     mesh: Arc<ProgressiveMesh>,
     pub(crate) forest: Forest,
-    pub(crate) bounds: Bounds,
+    pub(crate) bounds: Arc<Bounds>,
+}
+
+/// Goes through all splits, so that every reference is followed, and gives the hierarchy and the finest mesh.
+fn finest(mesh: &ProgressiveMesh) -> Result<(Forest, Front), Damage> {
+    // Lengths, references and wedges, in the order of the splits.
+    mesh.cursor()?.seek(usize::MAX)?;
+    let mut forest = Forest::new(mesh);
+    let mut front = Front::new(mesh, &forest);
+    let mut row_before = std::mem::take(&mut forest.row_before);
+    for i in 0..forest.len() as u32 {
+        front.split(mesh, &forest, i, Some(&mut row_before))?;
+    }
+    forest.row_before = row_before;
+    Ok((forest, front))
+}
+
+/// The finest mesh, about the middle of its box.
+struct Finest {
+    positions: Vec<DVec3>,
+    corners: Vec<[u32; 3]>,
+    origin: DVec3,
+    diagonal: f64,
+}
+
+impl Finest {
+    /// `front` is at full detail.
+    fn new(pm: &ProgressiveMesh, forest: &Forest, front: &Front) -> Finest {
+        let vertices = forest.base_vertices + forest.len() as u32;
+        let mut positions: Vec<DVec3> =
+            (0..vertices).map(|v| forest.position(pm, front.node(v), v)).collect();
+        let (lo, hi) = positions
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
+        let (origin, diagonal) =
+            if positions.is_empty() { (DVec3::ZERO, 0.0) } else { (0.5 * lo + 0.5 * hi, (hi - lo).length()) };
+        positions.iter_mut().for_each(|p| *p -= origin);
+        let corners = front.corners().iter().map(|f| f.map(|w| front.wedge_vertex(w))).collect();
+        Finest { positions, corners, origin, diagonal }
+    }
 }
 
 impl Hierarchy {
-    /// Builds the hierarchy: goes through all splits once in each direction and measures. About 70 microseconds a vertex.
+    /// Builds the hierarchy: goes through all splits once in each direction. Bounds are those that the mesh carries ([`ProgressiveMesh::bounds`]); if it has none they are
+    /// measured, which takes about 70 microseconds a vertex.
     ///
-    /// Errors: a damaged progressive mesh; every reference of it is followed here, so that views meet no damage.
+    /// Errors: a damaged progressive mesh, or bounds that are not for it or do not nest; every reference is followed here, so that views meet no damage.
     pub fn new(mesh: Arc<ProgressiveMesh>, options: &Options) -> Result<Hierarchy, Damage> {
-        // Lengths, references and wedges, in the order of the splits.
-        mesh.cursor()?.seek(usize::MAX)?;
-        let mut forest = Forest::new(&mesh);
-        let mut front = Front::new(&mesh, &forest);
-        let mut row_before = std::mem::take(&mut forest.row_before);
-        for i in 0..forest.len() as u32 {
-            front.split(&mesh, &forest, i, Some(&mut row_before))?;
-        }
-        forest.row_before = row_before;
-        let bounds = deviation::measure(&mesh, &forest, &front, options);
+        let (forest, front) = finest(&mesh)?;
+        let bounds = match &mesh.bounds {
+            Some(bounds) => {
+                bounds.check(&mesh, &forest)?;
+                bounds.clone()
+            }
+            None => Arc::new(deviation::measure(&mesh, &forest, &front, options)),
+        };
         Ok(Hierarchy { mesh, forest, bounds })
     }
 
@@ -90,21 +131,24 @@ impl Hierarchy {
 
     /// The bounds of split `i`. Panics if there is no such split.
     pub fn bounds(&self, i: usize) -> SplitBounds {
-        let centre = self.bounds.origin + self.local_centre(i as u32).as_dvec3();
-        self.bounds.of(i, centre)
+        self.bounds.at(i, self.bounds.origin + self.local_centre(i as u32).as_dvec3())
+    }
+
+    /// The bounds of all splits.
+    pub fn all_bounds(&self) -> &Arc<Bounds> {
+        &self.bounds
     }
 
     /// Where split `i` is, about the origin of the bounds, as everything is that is decided about it.
     #[inline]
     pub(crate) fn local_centre(&self, i: u32) -> glam::Vec3 {
         let vertex = self.mesh.splits.vertex[i as usize];
-        let p = self.forest.position(&self.mesh, self.forest.parent[i as usize], vertex);
-        (p - self.bounds.origin).as_vec3()
+        self.bounds.place(&self.mesh, &self.forest, self.forest.parent[i as usize], vertex)
     }
 
     /// The middle of the box around the finest mesh's vertices, and the length of its diagonal.
     pub fn extent(&self) -> (DVec3, f64) {
-        (self.bounds.origin, self.bounds.diagonal)
+        self.bounds.extent()
     }
 
     /// Bytes of what views share, without the attributes of wedges, the input's order and the splits' estimates.

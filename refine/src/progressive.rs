@@ -25,6 +25,8 @@ pub use order::NotInOrder;
 pub(crate) use order::RowsOf;
 
 use crate::aif::{Channel, NONE, Positions};
+use crate::hierarchy::Bounds;
+use std::sync::Arc;
 
 /// What a split does beside its references, packed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -271,6 +273,8 @@ pub struct ProgressiveMesh {
     pub order: Option<InputOrder>,
     /// Split counts at which levels stand, coarse to fine, full detail included (NSA: its passes).
     pub levels: Vec<u32>,
+    /// Bounds of the splits for view-dependent refinement, if they are known; without, [`crate::Hierarchy::new`] measures them.
+    pub bounds: Option<Arc<Bounds>>,
 }
 
 impl ProgressiveMesh {

@@ -4,13 +4,16 @@ mod common;
 
 use common::{NAMES, assert_same, input_of, options, sample};
 use progmesh_meshes::{GenerateOptions, Sample, generate};
-use progmesh_refine::ProgressiveMesh;
 use progmesh_refine::aif::*;
 use progmesh_refine::format::*;
-use progmesh_refine::progressive::{build, build_all, same_positions};
+use progmesh_refine::hierarchy::{Bounds, Guarantee};
+use progmesh_refine::progressive::{Damage, build, build_all, same_positions};
 use progmesh_refine::simplify::{Method, Options, Placement, Quiet};
+use progmesh_refine::{Hierarchy, ProgressiveMesh};
 use proptest::prelude::*;
+use std::collections::HashMap;
 use std::io::Read;
+use std::sync::Arc;
 
 /// The sample, in single precision or in places that need double.
 fn mesh_of(s: &Sample, double: bool) -> Mesh {
@@ -221,7 +224,10 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
 /// Files of three meshes, a scene and all kinds of chunks; small enough to be damaged everywhere.
 fn victims() -> [Vec<u8>; 2] {
     let meshes = vec![sample("scan", 260, 1), sample("polygons", 120, 1), sample("cad", 150, 1)];
-    let all = build_all(meshes, &[1.0; 3], &Options::default(), &Quiet).unwrap();
+    let mut all = build_all(meshes, &[1.0; 3], &Options::default(), &Quiet).unwrap();
+    let given = vec![0.25; all.meshes[2].splits.len()];
+    let bounds = Bounds::with_errors(&all.meshes[2], &given, Guarantee::Proven).unwrap();
+    all.meshes[2].bounds = Some(Arc::new(bounds));
     [false, true].map(|alone| {
         let options = EncodeOptions::default().with_alone(alone);
         encode(&all.meshes, &all.turns, b"a scene", &options).unwrap()
@@ -338,13 +344,13 @@ fn change_places(bytes: &[u8]) {
     for k in 0..n {
         let mut twice = all.clone();
         twice.insert(k, k);
-        let scene = directory.chunks[k].kind == ChunkType::SCENE;
-        let order = directory.chunks[k].kind == ChunkType::ORDER;
+        let spare =
+            [ChunkType::SCENE, ChunkType::ORDER, ChunkType::BOUNDS].contains(&directory.chunks[k].kind);
         assert!(decode(&build(&twice)).is_err(), "{k}: {}", directory.chunks[k].kind);
         let mut less = all.clone();
         less.remove(k);
         if let Ok(d) = decode(&build(&less)) {
-            assert!(scene || order || !d.report.complete);
+            assert!(spare || !d.report.complete);
             walk(&d);
         }
         for j in 0..k {
@@ -494,4 +500,103 @@ fn every_file_of_the_corpus_and_every_truncation_is_survived() {
         }
     }
     assert!(files >= 3 && whole >= 3, "{files} files, {whole} whole");
+}
+
+/// The meshes of [`several`] with bounds: measured, and given.
+fn bounded() -> (Vec<ProgressiveMesh>, Vec<u32>) {
+    let (mut meshes, turns) = several();
+    for (k, pm) in meshes.iter_mut().enumerate() {
+        let given: Vec<f64> = pm.splits.error.iter().map(|&e| 1.5 * e as f64).collect();
+        let bounds = match k {
+            0 => Bounds::measure(pm, &Default::default()),
+            _ => Bounds::with_errors(pm, &given, Guarantee::Vertical),
+        };
+        pm.bounds = Some(Arc::new(bounds.unwrap()));
+    }
+    (meshes, turns)
+}
+
+/// Whose bounds are in the right place: at each vertex that is made, with the error of the last split at it before.
+fn bounds_by_place(pm: &ProgressiveMesh) -> HashMap<[u64; 3], [f64; 2]> {
+    let bounds = pm.bounds.as_ref().unwrap();
+    let place = |i: usize| pm.new_positions.get(i).to_array().map(f64::to_bits);
+    (0..pm.splits.len()).map(|i| (place(i), [bounds.error(i), bounds.radius(i)])).collect()
+}
+
+#[test]
+fn bounds_are_kept_with_the_splits_they_are_of() {
+    let (meshes, turns) = bounded();
+    for alone in [false, true] {
+        let options = EncodeOptions::default().with_alone(alone);
+        let bytes = encode(&meshes, &turns, b"scene", &options).unwrap();
+        let decoded = decode(&bytes).unwrap();
+        assert_eq!(decoded.report.streams.total(), bytes.len() as u64);
+        for (a, b) in decoded.meshes.iter().zip(&meshes) {
+            assert_eq!(bounds_by_place(a), bounds_by_place(b));
+            assert_eq!(a.bounds.as_ref().unwrap().guarantee(), b.bounds.as_ref().unwrap().guarantee());
+            // They still nest, and are what the hierarchy uses.
+            let h = Hierarchy::new(Arc::new(a.clone()), &Default::default()).unwrap();
+            assert!(Arc::ptr_eq(h.all_bounds(), a.bounds.as_ref().unwrap()));
+        }
+        // In a stream, as a prefix, and by ranges.
+        let r = RangeReader::new(&bytes[..]).unwrap();
+        let chunks = &r.directory().chunks;
+        let own: Vec<_> = chunks.iter().filter(|c| c.kind == ChunkType::BOUNDS).collect();
+        for c in &own {
+            let before = chunks[c.index as usize - 1];
+            assert_eq!((before.mesh, before.first, before.count), (c.mesh, c.first, c.count));
+            let Piece::Bounds(b) = r.read(c.index, None).unwrap() else { panic!("no bounds") };
+            let all = decoded.meshes[c.mesh as usize].bounds.as_ref().unwrap();
+            assert_eq!(*b, all.slice(c.first as usize..(c.first + c.count) as usize));
+        }
+        let middle = own[own.len() / 2];
+        let prefix = decode_prefix(&bytes[..middle.range().end as usize]).unwrap();
+        let have = &prefix.meshes[middle.mesh as usize];
+        assert_eq!(have.bounds.as_ref().map(|b| b.len()), Some(have.splits.len()));
+        // Without those of the last chunk there are none.
+        let prefix = decode_prefix(&bytes[..middle.offset as usize]).unwrap();
+        assert!(prefix.meshes[middle.mesh as usize].bounds.is_none());
+        let mut reader = PmReader::new(&bytes[..]).unwrap();
+        while reader.advance().unwrap().is_some() {}
+        assert_eq!(reader.finish().meshes, decoded.meshes);
+    }
+}
+
+#[test]
+fn quantising_widens_bounds_by_what_it_moves() {
+    let (meshes, turns) = bounded();
+    let bytes = encode(&meshes, &turns, &[], &EncodeOptions::default().with_quantize(Some(9))).unwrap();
+    let decoded = decode(&bytes).unwrap();
+    for (m, (a, b)) in decoded.meshes.iter().zip(&meshes).enumerate() {
+        let moved = decoded.report.quantisation_errors[m];
+        let sum = |pm: &ProgressiveMesh| -> f64 {
+            let b = pm.bounds.as_ref().unwrap();
+            (0..b.len()).map(|i| b.error(i)).sum()
+        };
+        let grown = (sum(a) - sum(b)) / a.splits.len() as f64;
+        assert!(moved > 0.0 && grown >= 2.0 * moved && grown < 2.5 * moved, "{grown} {moved}");
+        Hierarchy::new(Arc::new(a.clone()), &Default::default()).unwrap();
+    }
+}
+
+#[test]
+fn bounds_that_cannot_be_are_refused() {
+    let (mut meshes, _) = bounded();
+    let pm = meshes.swap_remove(1);
+    let n = pm.splits.len();
+    let bounds = pm.bounds.clone().unwrap();
+    assert!(matches!(Bounds::with_errors(&pm, &[1.0], Guarantee::Proven), Err(Damage::Length { .. })));
+    let other = |b: Bounds| ProgressiveMesh { bounds: Some(Arc::new(b)), ..pm.clone() };
+    let short = other(bounds.slice(0..n - 1));
+    assert!(matches!(
+        encode(std::slice::from_ref(&short), &[], &[], &EncodeOptions::default()),
+        Err(EncodeError::Inconsistent(0))
+    ));
+    assert!(matches!(Hierarchy::new(Arc::new(short), &Default::default()), Err(Damage::Length { .. })));
+    let back: Vec<u32> = (0..n as u32).rev().collect();
+    let turned = other(bounds.reordered(&back).unwrap());
+    assert!(matches!(Hierarchy::new(Arc::new(turned), &Default::default()), Err(Damage::Bounds(_))));
+    // Errors that are no numbers bound nothing, and are larger than all others.
+    let none = Bounds::with_errors(&pm, &vec![f64::NAN; n], Guarantee::Proven).unwrap();
+    assert!((0..n).all(|i| none.error(i) > 1e38));
 }

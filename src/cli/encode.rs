@@ -9,6 +9,7 @@ use progmesh::io::files;
 use progmesh::io::pm::encode_progressive;
 use progmesh::pipeline::build_progressive;
 use progmesh::refine::format::{EncodeOptions, RangeReader};
+use progmesh::refine::hierarchy;
 use progmesh::simplify::Stop;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -23,6 +24,7 @@ use std::time::Instant;
 Examples:
   progmesh encode bunny.obj bunny.pm
   progmesh encode scan.ply scan.pm --placement endpoint --any-order
+  progmesh encode dragon.ply dragon.pm --bounds
   progmesh encode scene.glb scene.pm --quantize 14
   progmesh encode horse.ply horse.pm --method nsa --epsilon 12")]
 pub(crate) struct Args {
@@ -42,6 +44,9 @@ pub(crate) struct Args {
     /// Chunks that can be read alone, in any order, for views that load only what they need: larger by half
     #[arg(long, help_heading = "File")]
     random_access: bool,
+    /// Measure and write what view-dependent refinement decides by, so that extract and fly begin at once: some 5 bytes a vertex
+    #[arg(long, help_heading = "File")]
+    bounds: bool,
     /// Print one JSON object about the run on standard output (see docs/json.md)
     #[arg(long)]
     json: bool,
@@ -86,6 +91,19 @@ impl Args {
                 return Err(Failure::Interrupted);
             }
             warnings.say(built.warnings.iter().map(|w| format!("{file}: {w}")));
+            let mut built = built;
+            let measuring = Instant::now();
+            if self.bounds {
+                let options = hierarchy::Options::default();
+                built
+                    .scene
+                    .measure_bounds(&options)
+                    .map_err(|(m, e)| Failure::Input(format!("{file}: mesh {m}: {e}")))?;
+                if interrupt.is_set() {
+                    return Err(Failure::Interrupted);
+                }
+            }
+            let bounds = measuring.elapsed().as_secs_f64();
             let encoding = Instant::now();
             let options = EncodeOptions::default()
                 .with_any_order(self.any_order)
@@ -116,6 +134,7 @@ impl Args {
                     read,
                     build: built.build_seconds,
                     simplify: built.simplify_seconds,
+                    bounds,
                     encode,
                     write: writing.elapsed().as_secs_f64(),
                     total: start.elapsed().as_secs_f64(),
@@ -161,6 +180,7 @@ struct Seconds {
     read: f64,
     build: f64,
     simplify: f64,
+    bounds: f64,
     encode: f64,
     write: f64,
     total: f64,
@@ -175,7 +195,7 @@ impl Report {
         let t = &self.seconds;
         format!(
             "{file}: {} triangles -> base of {} and {} splits, {} bytes ({:.1} bits a vertex){quantized}; {}, {:.3} s (read {:.3}, \
-             build {:.3}, simplify {:.3}, encode {:.3}, write {:.3})",
+             build {:.3}, simplify {:.3}, bounds {:.3}, encode {:.3}, write {:.3})",
             thousands(self.triangles),
             thousands(self.base_triangles),
             thousands(self.splits),
@@ -186,6 +206,7 @@ impl Report {
             t.read,
             t.build,
             t.simplify,
+            t.bounds,
             t.encode,
             t.write
         )

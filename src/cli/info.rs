@@ -170,6 +170,7 @@ struct Streams {
     faces: u64,
     order: u64,
     scene: u64,
+    bounds: u64,
     other: u64,
 }
 
@@ -193,6 +194,7 @@ impl ProgressiveInfo {
                 faces: r.streams.faces,
                 order: r.streams.order,
                 scene: r.streams.scene,
+                bounds: r.streams.bounds,
                 other: r.streams.other,
             }),
         }

@@ -6,7 +6,9 @@ use super::input_order;
 use super::read::Piece;
 use super::sequel::{self, Sequel};
 use super::splits::{self, SplitBlock};
+use crate::hierarchy::Bounds;
 use crate::progressive::{InputOrder, ProgressiveMesh};
+use std::sync::Arc;
 
 /// Meshes in the making: what the chunks so far make of them.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +24,8 @@ struct Part {
     mesh: ProgressiveMesh,
     faces: usize,
     wedges: usize,
+    /// As far as they were read.
+    bounds: Option<Bounds>,
     /// Once splits were read with it.
     sequel: Option<Sequel>,
     /// Damage has ended it.
@@ -82,7 +86,7 @@ impl Assembly {
             (Piece::Base(both), Some(part @ None)) => {
                 let (head, mesh) = *both;
                 let (faces, wedges) = (head.base_faces as usize, head.base_wedges as usize);
-                *part = Some(Part { head, mesh, faces, wedges, sequel: None, void: false });
+                *part = Some(Part { head, mesh, faces, wedges, bounds: None, sequel: None, void: false });
             }
             (Piece::Splits(block), Some(Some(part))) => {
                 if part.sequel.is_some() || !part.append(&block) {
@@ -98,6 +102,21 @@ impl Assembly {
                         part.void = true;
                         return Err(chunk.damage("its contents contradict each other, or what came before"));
                     }
+                }
+            }
+            (Piece::Bounds(bounds), Some(Some(part))) => {
+                let have = part.bounds.as_ref().map_or(0, Bounds::len);
+                if chunk.first as usize != have || have + bounds.len() > part.mesh.splits.len() {
+                    return Err(
+                        chunk.damage("its splits are not there, or their bounds do not follow those before")
+                    );
+                }
+                let follows = match &mut part.bounds {
+                    Some(all) => all.append(&bounds),
+                    none => none.replace(*bounds).is_none(),
+                };
+                if !follows {
+                    return Err(chunk.damage("it does not go with the bounds before"));
                 }
             }
             (Piece::Order(bytes), Some(Some(part))) if part.mesh.order.is_none() => {
@@ -125,6 +144,7 @@ impl Assembly {
         for part in self.meshes.into_iter().flatten() {
             let mut pm = part.mesh;
             let n = pm.splits.len() as u32;
+            pm.bounds = part.bounds.filter(|b| b.len() == n as usize).map(Arc::new);
             pm.levels = part.head.levels.iter().copied().filter(|&l| l < n).chain([n]).collect();
             report.quantisation_errors.push(part.head.quantisation_error);
             report.flat_faces.push(part.head.flat_faces);
@@ -188,6 +208,8 @@ pub struct StreamSizes {
     pub order: u64,
     /// The scene.
     pub scene: u64,
+    /// Bounds of splits.
+    pub bounds: u64,
     /// All else.
     pub other: u64,
     /// Chunks of splits.
@@ -200,6 +222,7 @@ impl StreamSizes {
             ChunkType::BASE => self.base += chunk.stored,
             ChunkType::ORDER => self.order += chunk.stored,
             ChunkType::SCENE => self.scene += chunk.stored,
+            ChunkType::BOUNDS => self.bounds += chunk.stored,
             ChunkType::SPLITS | ChunkType::SEQUEL => {
                 let [c, e, p, a, f] = splits::sizes(bytes).unwrap_or_default();
                 self.connectivity += c;
@@ -225,6 +248,7 @@ impl StreamSizes {
             + self.faces
             + self.order
             + self.scene
+            + self.bounds
             + self.other
     }
 }

@@ -33,7 +33,7 @@ impl ChunkType {
     pub const ORDER: ChunkType = ChunkType(*b"ORDR");
     /// What the mesh stands in; opaque here.
     pub const SCENE: ChunkType = ChunkType(*b"SCNE");
-    /// Bounds of splits for view-dependent refinement (specified, not written yet).
+    /// Bounds of splits for view-dependent refinement.
     pub const BOUNDS: ChunkType = ChunkType(*b"BNDS");
     /// Blocks of a terrain (specified, not written yet).
     pub const TERRAIN: ChunkType = ChunkType(*b"TERR");
@@ -313,8 +313,14 @@ impl Directory {
             if c.raw > c.stored.saturating_mul(EXPANSION) || c.count as u64 > c.raw {
                 return Err(c.damage("it is too short for what it is to hold"));
             }
-            const KNOWN: [ChunkType; 5] =
-                [ChunkType::BASE, ChunkType::SPLITS, ChunkType::SEQUEL, ChunkType::ORDER, ChunkType::SCENE];
+            const KNOWN: [ChunkType; 6] = [
+                ChunkType::BASE,
+                ChunkType::SPLITS,
+                ChunkType::SEQUEL,
+                ChunkType::BOUNDS,
+                ChunkType::ORDER,
+                ChunkType::SCENE,
+            ];
             let known = KNOWN.contains(&c.kind);
             if !known {
                 if c.critical {

@@ -2,8 +2,10 @@
 
 use super::assembly::{Assembly, Decoded, StreamSizes};
 use super::base::{self, MeshHead};
+use super::bounds;
 use super::container::{Chunk, ChunkType, Directory, FormatError, HEAD};
 use super::splits::{self, SplitBlock};
+use crate::hierarchy::Bounds;
 use crate::progressive::ProgressiveMesh;
 use std::io::Read;
 use std::ops::Range;
@@ -18,6 +20,8 @@ pub enum Piece {
     Splits(Box<SplitBlock>),
     /// Bytes of splits that are read with the mesh they refine ([`Assembly`]).
     Sequel(Vec<u8>),
+    /// Bounds of splits of a mesh: those from [`Chunk::first`] on.
+    Bounds(Box<Bounds>),
     /// Bytes of the input's order of a mesh; they are read with the mesh ([`Assembly`]).
     Order(Vec<u8>),
     /// The scene, opaque here.
@@ -44,6 +48,10 @@ fn read_piece(chunk: &Chunk, head: Option<&MeshHead>, bytes: &[u8]) -> Result<Pi
             Ok(Piece::Splits(Box::new(block)))
         }
         ChunkType::SEQUEL => Ok(Piece::Sequel(bytes.to_vec())),
+        ChunkType::BOUNDS => {
+            let bounds = bounds::read(bytes, chunk.count as usize, chunk.raw).ok_or_else(damaged)?;
+            Ok(Piece::Bounds(Box::new(bounds)))
+        }
         ChunkType::ORDER => Ok(Piece::Order(bytes.to_vec())),
         ChunkType::SCENE if chunk.raw != chunk.stored => Err(damaged()),
         ChunkType::SCENE => Ok(Piece::Scene(bytes.to_vec())),

@@ -1,13 +1,16 @@
 //! Progressive meshes to a file.
 
 use super::base::{self, MeshHead};
+use super::bounds;
 use super::container::{Chunk, ChunkType, Directory, EXPANSION};
 use super::input_order;
 use super::lattice;
 use super::plan::{Piece, Plan};
 use super::sequel::{self, Sequel};
 use super::splits::{self, Counts, Fans};
+use crate::hierarchy::Bounds;
 use crate::progressive::{Damage, ProgressiveMesh, RowsOf};
+use std::sync::Arc;
 
 /// How to write.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -93,6 +96,7 @@ fn part(kind: ChunkType, critical: bool, mesh: u32, raw: u64, mut bytes: Vec<u8>
 /// Writes progressive meshes as a `.pm` file, which FORMAT.md specifies.
 ///
 /// `turns` is the common order of the splits of all meshes, as in [`crate::progressive::BuiltAll::turns`] (empty: mesh after mesh); `scene` is kept as it is. The
+/// bounds that meshes carry ([`ProgressiveMesh::bounds`]) are written, widened by what quantising moves. The
 /// splits come in another order in the file than in `meshes`, and so have other numbers ([`ProgressiveMesh::reordered`]); errors are rounded up by
 /// at most an eighth; all else is kept. The bytes do not depend on the number of threads. O(n log n).
 ///
@@ -111,6 +115,9 @@ pub fn encode(
     let mut orders = Vec::new();
     for (m, pm) in meshes.iter().enumerate() {
         pm.cursor().map_err(|damage| EncodeError::Damage { mesh: m, damage })?;
+        if pm.bounds.as_ref().is_some_and(|b| b.len() != pm.splits.len()) {
+            return Err(EncodeError::Inconsistent(m));
+        }
         let places: Vec<u32> =
             turns.iter().zip(0u32..).filter(|(t, _)| **t as usize == m).map(|(_, k)| k).collect();
         let parts = encode_mesh(m as u32, pm, &places, options).ok_or(EncodeError::Inconsistent(m))?;
@@ -193,6 +200,10 @@ fn encode_mesh(
     let mut base = part(ChunkType::BASE, true, m, base::raw_bytes(&head), base::write(&head, &mut pm)?);
     base.chunk.count = head.base_vertices;
     let fans = if options.alone { Some(Fans::new(&pm).ok()?) } else { None };
+    let bounds = match &pm.bounds {
+        Some(b) if quantisation_error > 0.0 => Some(Arc::new(b.after_moving(&pm, quantisation_error).ok()?)),
+        b => b.clone(),
+    };
     let starts = starts(&pm, &pm.rows_of_splits(), &plan.pieces);
     let pack = |piece: &Piece, ends: &[Counts], kind: ChunkType, bytes: Vec<u8>| {
         let (first, end) = (ends[0], ends[1]);
@@ -235,7 +246,28 @@ fn encode_mesh(
         }
         _ => None,
     };
-    Some(MeshParts { base, splits: splits?, order })
+    let mut all = Vec::with_capacity(2 * plan.pieces.len());
+    for p in splits? {
+        let beside = match &bounds {
+            Some(bounds) => Some(bounds_of(&p, bounds)?),
+            None => None,
+        };
+        all.push(p);
+        all.extend(beside);
+    }
+    Some(MeshParts { base, splits: all, order })
+}
+
+/// The bounds of a chunk of splits, to stand behind it.
+fn bounds_of(splits: &Part, bounds: &Bounds) -> Option<Part> {
+    let (first, count) = (splits.chunk.first as usize, splits.chunk.count as usize);
+    let bytes = bounds::write(bounds, first..first + count)?;
+    let mut p = part(ChunkType::BOUNDS, false, splits.chunk.mesh, bounds::raw_bytes(count), bytes);
+    p.turn = splits.turn;
+    let Chunk { first, count, band, subtree, .. } = splits.chunk;
+    p.chunk = Chunk { first, count, band, subtree, ..p.chunk };
+    p.chunk.error = (first..first + count).map(|i| bounds.error(i as usize) as f32).fold(0.0, f32::max);
+    Some(p)
 }
 
 /// Where the arrays stand at the start of every piece, and at the end.

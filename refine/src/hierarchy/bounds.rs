@@ -1,5 +1,7 @@
-//! Bounds of splits, packed into ten bytes.
+//! Bounds of splits, packed into eight bytes.
 
+use super::cone::Cone;
+use crate::progressive::{Damage, ProgressiveMesh};
 use crate::view::NormalCone;
 use glam::{DVec3, Vec3};
 
@@ -16,82 +18,52 @@ pub struct SplitBounds {
     pub error: f64,
 }
 
-/// Bounds of all splits.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Bounds {
+/// What errors are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Guarantee {
+    /// Largest distances found while splits are undone in several orders, with a margin.
+    #[default]
+    Measured,
+    /// Distances that no mesh of the hierarchy exceeds, by proof of whoever gave them.
+    Proven,
+    /// Differences of height over a plane, proven by whoever gave them; distances are no larger.
+    Vertical,
+}
+
+impl Guarantee {
+    pub(crate) fn code(self) -> u8 {
+        match self {
+            Guarantee::Measured => 0,
+            Guarantee::Proven => 1,
+            Guarantee::Vertical => 2,
+        }
+    }
+
+    pub(crate) fn from_code(code: u8) -> Option<Guarantee> {
+        [Guarantee::Measured, Guarantee::Proven, Guarantee::Vertical].into_iter().find(|g| g.code() == code)
+    }
+}
+
+/// Bounds of all splits of a progressive mesh, or of a run of them; 8 B a split.
+///
+/// They belong to the splits, not to their order: [`ProgressiveMesh::reordered`] takes those that a mesh carries ([`ProgressiveMesh::bounds`]) along. Errors and radii are
+/// rounded up, by at most 1 in 256, cones are widened by at most 0.3 degrees.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bounds {
     /// Centres are taken about this, and then rounded to f32; radii allow for that.
     pub(crate) origin: DVec3,
     pub(crate) diagonal: f64,
-    pub(crate) error: Vec<u16>,
-    pub(crate) radius: Vec<u16>,
-    pub(crate) axis: Vec<u32>,
-    pub(crate) angle: Vec<u16>,
+    pub(crate) guarantee: Guarantee,
+    pub(crate) of: Vec<Packed>,
 }
 
-/// A normal cone as it is stored.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Cone {
-    pub(crate) axis: u32,
-    pub(crate) angle: u16,
-}
-
-/// A cone that holds all directions.
-const WIDE: u16 = u16::MAX;
-/// Angles of stored cones: these many steps to 90 degrees.
-const STEPS: f64 = 65000.0;
-
-impl Cone {
-    pub(crate) const ALL: Cone = Cone { axis: 0, angle: WIDE };
-
-    /// The least that can be stored and holds `cone`.
-    pub(crate) fn around(cone: &NormalCone) -> Cone {
-        let axis = pack_direction(cone.axis());
-        let angle = cone.half_angle() + cone.axis().angle_between(unpack_direction(axis));
-        let steps = (angle / std::f64::consts::FRAC_PI_2 * STEPS).ceil() + 1.0;
-        // Not the comparison turned round: NaN tells nothing.
-        if steps < STEPS { Cone { axis, angle: steps as u16 } } else { Cone::ALL }
-    }
-
-    #[inline]
-    pub(crate) fn unpack(self) -> NormalCone {
-        if self.angle == WIDE {
-            return NormalCone::ALL;
-        }
-        NormalCone::new(unpack_direction(self.axis), self.angle as f64 / STEPS * std::f64::consts::FRAC_PI_2)
-    }
-}
-
-impl Cone {
-    /// Axis, and cosine and sine of the half angle; a cosine of -1 for a cone that tells nothing.
-    #[inline]
-    pub(crate) fn unpack_parts(self) -> (Vec3, f32, f32) {
-        if self.angle == WIDE {
-            return (Vec3::Z, -1.0, 0.0);
-        }
-        let (sin, cos) = (self.angle as f32 * (std::f32::consts::FRAC_PI_2 / STEPS as f32)).sin_cos();
-        (unpack_direction(self.axis).as_vec3(), cos, sin)
-    }
-}
-
-/// A direction as a point of an octahedron, 16 bits each way.
-fn pack_direction(d: DVec3) -> u32 {
-    let sum = d.abs().element_sum();
-    if sum.is_nan() || sum <= 0.0 {
-        return 0;
-    }
-    let (x, y) = (d.x / sum, d.y / sum);
-    let (x, y) = if d.z < 0.0 { ((1.0 - y.abs()).copysign(x), (1.0 - x.abs()).copysign(y)) } else { (x, y) };
-    let code = |t: f64| ((t * 0.5 + 0.5) * 65535.0).round() as u32;
-    code(x) | code(y) << 16
-}
-
-/// The direction stored, of unit length.
-#[inline]
-fn unpack_direction(code: u32) -> DVec3 {
-    let (x, y) = ((code & 0xffff) as f64 / 32767.5 - 1.0, (code >> 16) as f64 / 32767.5 - 1.0);
-    let z = 1.0 - x.abs() - y.abs();
-    let fold = (-z).max(0.0);
-    DVec3::new(x - fold.copysign(x), y - fold.copysign(y), z).normalize()
+/// The bounds of a split as they are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Packed {
+    pub(crate) error: u16,
+    pub(crate) radius: u16,
+    pub(crate) cone: Cone,
 }
 
 /// The least stored number that is not below `x`: the 8 bits of an f32's exponent and the first 8 of its mantissa. Not negative.
@@ -114,17 +86,147 @@ pub(crate) fn unpack(code: u16) -> f32 {
 }
 
 impl Bounds {
-    pub(crate) fn of(&self, i: usize, centre: DVec3) -> SplitBounds {
-        SplitBounds {
-            centre,
-            radius: unpack(self.radius[i]) as f64,
-            cone: Cone { axis: self.axis[i], angle: self.angle[i] }.unpack(),
-            error: unpack(self.error[i]) as f64,
+    /// Measures the bounds of a progressive mesh; see the [module](super) for what that gives. The same for every number of threads.
+    ///
+    /// Errors: a damaged progressive mesh.
+    pub fn measure(mesh: &ProgressiveMesh, options: &super::Options) -> Result<Bounds, Damage> {
+        let (forest, front) = super::finest(mesh)?;
+        Ok(super::deviation::measure(mesh, &forest, &front, options))
+    }
+
+    /// Bounds with errors that are known otherwise, such as those of terrain, model units: `errors[i]` is to be at least the deviation of every mesh without split `i`
+    /// from the finest one, wherever the vertex that it splits answers for it. They are raised to be no less than those below them in the hierarchy, and rounded up; spheres and
+    /// cones are found here. O(n).
+    ///
+    /// Errors: a damaged progressive mesh, or not one error for each split.
+    pub fn with_errors(
+        mesh: &ProgressiveMesh,
+        errors: &[f64],
+        guarantee: Guarantee,
+    ) -> Result<Bounds, Damage> {
+        if errors.len() != mesh.splits.len() {
+            return Err(Damage::Length { what: "bounds", len: errors.len(), want: mesh.splits.len() });
+        }
+        let (forest, front) = super::finest(mesh)?;
+        let mut bounds = super::spheres::around(mesh, &forest, &super::Finest::new(mesh, &forest, &front));
+        bounds.guarantee = guarantee;
+        // What is no number promises nothing.
+        let known = |e: &f64| if e.is_nan() { f64::INFINITY } else { e.max(0.0) };
+        bounds.set_errors(&forest, errors.iter().map(known).collect());
+        Ok(bounds)
+    }
+
+    /// Keeps errors, raised to nest.
+    pub(crate) fn set_errors(&mut self, forest: &super::Forest, mut errors: Vec<f64>) {
+        for i in (0..errors.len()).rev() {
+            let e = errors[i];
+            self.of[i].error = pack_up(e);
+            if let Some(up) = errors.get_mut(forest.maker(forest.parent[i]) as usize) {
+                *up = up.max(e);
+            }
         }
     }
 
-    pub(crate) fn bytes(&self) -> usize {
-        10 * self.error.len()
+    /// Splits.
+    pub fn len(&self) -> usize {
+        self.of.len()
+    }
+
+    /// True if there is none.
+    pub fn is_empty(&self) -> bool {
+        self.of.is_empty()
+    }
+
+    /// What the errors are.
+    pub fn guarantee(&self) -> Guarantee {
+        self.guarantee
+    }
+
+    /// The error of split `i`, model units. Panics if there is no such split.
+    pub fn error(&self, i: usize) -> f64 {
+        unpack(self.of[i].error) as f64
+    }
+
+    /// The radius of the sphere of split `i`, model units, about the vertex that it splits. Panics if there is no such split.
+    pub fn radius(&self, i: usize) -> f64 {
+        unpack(self.of[i].radius) as f64
+    }
+
+    /// The normal cone of split `i`. Panics if there is no such split.
+    pub fn cone(&self, i: usize) -> NormalCone {
+        self.of[i].cone.unpack()
+    }
+
+    /// The middle of the box around the finest mesh's vertices, about which centres are rounded to f32, and the length of its diagonal.
+    pub fn extent(&self) -> (DVec3, f64) {
+        (self.origin, self.diagonal)
+    }
+
+    /// Those of the splits in a range, which are numbered from 0 then. Panics if there are no such splits.
+    pub fn slice(&self, range: std::ops::Range<usize>) -> Bounds {
+        Bounds { of: self.of[range].to_vec(), ..self.without_splits() }
+    }
+
+    /// Appends the bounds of the splits that follow; false (and nothing done) if they are of another mesh.
+    pub fn append(&mut self, next: &Bounds) -> bool {
+        let same = self.without_splits() == next.without_splits();
+        if same {
+            self.of.extend_from_slice(&next.of);
+        }
+        same
+    }
+
+    fn without_splits(&self) -> Bounds {
+        let (origin, diagonal, guarantee) = (self.origin, self.diagonal, self.guarantee);
+        Bounds { origin, diagonal, guarantee, of: Vec::new() }
+    }
+
+    /// Those of the same mesh with split `order[k]` as the `k`-th; `None` if there is no such split.
+    pub fn reordered(&self, order: &[u32]) -> Option<Bounds> {
+        let of = order.iter().map(|&i| self.of.get(i as usize).copied()).collect::<Option<_>>()?;
+        Some(Bounds { of, ..self.without_splits() })
+    }
+
+    /// For a mesh of which every vertex has moved by at most `by`: errors grow by twice that, as both meshes have moved, and spheres and cones are found anew.
+    ///
+    /// Errors: a damaged progressive mesh, or one of another size.
+    pub fn after_moving(&self, mesh: &ProgressiveMesh, by: f64) -> Result<Bounds, Damage> {
+        let errors: Vec<f64> = (0..self.len()).map(|i| self.error(i) + 2.0 * by).collect();
+        Bounds::with_errors(mesh, &errors, self.guarantee)
+    }
+
+    pub(crate) fn at(&self, i: usize, centre: DVec3) -> SplitBounds {
+        SplitBounds { centre, radius: self.radius(i), cone: self.cone(i), error: self.error(i) }
+    }
+
+    /// Where node `k`, which is `vertex`, stands, as everything is that is decided about it: about the origin, rounded.
+    #[inline]
+    pub(crate) fn place(&self, mesh: &ProgressiveMesh, forest: &super::Forest, k: u32, vertex: u32) -> Vec3 {
+        (forest.position(mesh, k, vertex) - self.origin).as_vec3()
+    }
+
+    /// Every split's error and sphere hold those below; else a split of which they do not.
+    pub(crate) fn check(&self, mesh: &ProgressiveMesh, forest: &super::Forest) -> Result<(), Damage> {
+        if self.len() != forest.len() {
+            return Err(Damage::Length { what: "bounds", len: self.len(), want: forest.len() });
+        }
+        let splits = &mesh.splits.vertex;
+        let centre = |i: usize| self.place(mesh, forest, forest.parent[i], splits[i]).as_dvec3();
+        for i in 0..self.len() {
+            let up = forest.maker(forest.parent[i]) as usize;
+            if let Some(above) = self.of.get(up) {
+                let reach = centre(i).distance(centre(up)) + self.radius(i);
+                if self.of[i].error > above.error || reach > self.radius(up) {
+                    return Err(Damage::Bounds(i));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes of those of all splits.
+    pub fn bytes(&self) -> usize {
+        size_of::<Packed>() * self.of.len()
     }
 }
 
@@ -143,21 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn stored_cones_hold_what_they_are_made_of() {
-        for k in 0..500 {
-            let t = k as f64;
-            let d = DVec3::new((t * 0.37).sin(), (t * 0.71).cos(), (t * 0.11).sin());
-            let cone = NormalCone::new(d, 0.001 * t);
-            let stored = Cone::around(&cone);
-            if stored == Cone::ALL {
-                assert!(cone.half_angle() > 1.56);
-                continue;
-            }
-            let back = stored.unpack();
-            let off = back.axis().angle_between(cone.axis());
-            assert!(off < 1e-4 && off + cone.half_angle() <= back.half_angle());
-            assert!(back.half_angle() < cone.half_angle() + 3e-4);
-        }
-        assert_eq!(Cone::around(&NormalCone::ALL), Cone::ALL);
+    fn a_split_takes_eight_bytes() {
+        assert_eq!(size_of::<Packed>(), 8);
     }
 }

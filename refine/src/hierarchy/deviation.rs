@@ -1,17 +1,16 @@
-//! Spheres, cones and errors of all splits, from walks from the finest mesh to the base.
+//! Errors of all splits, from walks from the finest mesh to the base.
 //!
 //! Samples of the finest mesh, its vertices and quarters of its edges, lie in buckets of the faces that are nearest to them. When a split is
 //! undone, the samples around it look for their nearest face again: among those around the vertex, and from there from face to face. What is
 //! found is a distance to some face, so never below the true one.
 
-use super::Options;
-use super::bounds::{Bounds, Cone, pack_up, unpack};
+use super::bounds::Bounds;
 use super::forest::Forest;
+use super::{Finest, Options, spheres};
 use crate::aif::NONE;
 use crate::progressive::ProgressiveMesh;
 use crate::selective::Front;
 use crate::simplify::measure::closest_on_triangle;
-use crate::view::NormalCone;
 use glam::DVec3;
 
 /// Samples a face of a star beyond which quarters of edges are left out, and then middles: there are enough vertices for it by then.
@@ -71,23 +70,9 @@ struct Walk<'a> {
 /// Bounds of all splits; `front` is at full detail. A few walks of O(n log n), for meshes whose hierarchy is as deep.
 pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: &Front, options: &Options) -> Bounds {
     let n = forest.len();
-    let vertices = forest.base_vertices as usize + n;
-    let exact: Vec<DVec3> = (0..vertices as u32).map(|v| forest.position(pm, front.node(v), v)).collect();
-    let (lo, hi) =
-        exact.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
-    let (origin, diagonal) =
-        if exact.is_empty() { (DVec3::ZERO, 0.0) } else { (0.5 * lo + 0.5 * hi, (hi - lo).length()) };
-    let positions: Vec<DVec3> = exact.iter().map(|&p| p - origin).collect();
-    let corners: Vec<[u32; 3]> = front.corners().iter().map(|f| f.map(|w| front.wedge_vertex(w))).collect();
-    let mut bounds = Bounds {
-        origin,
-        diagonal,
-        error: vec![0; n],
-        radius: vec![0; n],
-        axis: vec![0; n],
-        angle: vec![0; n],
-    };
-    spheres_and_cones(pm, forest, &positions, &corners, &mut bounds);
+    let finest = Finest::new(pm, forest, front);
+    let mut bounds = spheres::around(pm, forest, &finest);
+    let Finest { positions, corners, origin, diagonal } = finest;
     let mut error = vec![0.0; n];
     // In the order of the splits; then as cuts of equal error follow on each other; then with neighbours at other levels.
     let walk = |order: &mut dyn Iterator<Item = u32>, error: Vec<f64>| {
@@ -108,15 +93,8 @@ pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: &Front, opti
         error = walk(&mut by_error(pm, forest, |i| error[i as usize] * weight(i)).into_iter(), error);
     }
     // What was raised in one order, is raised in the hierarchy.
-    for i in (0..n as u32).rev() {
-        let above = forest.maker(forest.parent[i as usize]);
-        let e = error[i as usize];
-        bounds.error[i as usize] = pack_up(e * options.margin.max(1.0));
-        if above != NONE {
-            let up = &mut error[above as usize];
-            *up = up.max(e);
-        }
-    }
+    let margin = options.margin.max(1.0);
+    bounds.set_errors(forest, error.into_iter().map(|e| e * margin).collect());
     bounds
 }
 
@@ -138,53 +116,6 @@ fn by_error(pm: &ProgressiveMesh, forest: &Forest, error: impl Fn(u32) -> f64) -
     // Stable: of equal ones the later split goes first.
     order.sort_by(|&a, &b| least[a as usize].total_cmp(&least[b as usize]));
     order
-}
-
-fn spheres_and_cones(
-    pm: &ProgressiveMesh,
-    forest: &Forest,
-    positions: &[DVec3],
-    corners: &[[u32; 3]],
-    bounds: &mut Bounds,
-) {
-    // Added to radii at every level: rounding of centres and of what is decided about them never shows.
-    let slack = bounds.diagonal * 1e-6;
-    let mut radius = vec![0.0f64; positions.len()];
-    let mut cone: Vec<Option<NormalCone>> = vec![None; positions.len()];
-    for f in corners {
-        let p = f.map(|v| positions[v as usize]);
-        let normal = (p[1] - p[0]).cross(p[2] - p[0]);
-        for k in 0..3 {
-            let r = &mut radius[f[k] as usize];
-            *r = r.max(p[k].distance(p[(k + 1) % 3])).max(p[k].distance(p[(k + 2) % 3]));
-            // Faces without area show nothing.
-            if normal.length_squared() > 0.0 {
-                let own = NormalCone::new(normal, 0.0);
-                let c = &mut cone[f[k] as usize];
-                *c = Some(c.map_or(own, |c| c.join(&own)));
-            }
-        }
-    }
-    radius.iter_mut().for_each(|r| *r += slack);
-    for i in (0..forest.len() as u32).rev() {
-        let k = i as usize;
-        let (vs, vu) = (pm.splits.vertex[k] as usize, forest.base_vertices as usize + k);
-        // As splits see centres: rounded.
-        let place =
-            |node: u32, v: usize| (forest.position(pm, node, v as u32) - bounds.origin).as_vec3().as_dvec3();
-        let centre = place(forest.parent[k], vs);
-        let [old, new] = forest.nodes(i);
-        let reach = |node: u32, v: usize| centre.distance(place(node, v)) + radius[v];
-        bounds.radius[k] = pack_up(reach(old, vs).max(reach(new, vu)) + slack);
-        radius[vs] = unpack(bounds.radius[k]) as f64;
-        let joined = match (cone[vs], cone[vu]) {
-            (Some(a), Some(b)) => Some(a.join(&b)),
-            (a, b) => a.or(b),
-        };
-        let stored = joined.map_or(Cone::ALL, |c| Cone::around(&c));
-        (bounds.axis[k], bounds.angle[k]) = (stored.axis, stored.angle);
-        cone[vs] = joined.map(|_| stored.unpack());
-    }
 }
 
 impl<'a> Walk<'a> {

@@ -38,6 +38,9 @@ pub enum Damage {
     /// The attributes of a split are not all there, or name wedges that cannot be.
     #[error("the attributes of split {0} are incomplete or contradict themselves")]
     Wedges(usize),
+    /// The bounds of a split are not below those of the split above it.
+    #[error("the bounds of split {0} do not lie within those above it")]
+    Bounds(usize),
 }
 
 /// What a move of a [`Cursor`] changed in its buffers.

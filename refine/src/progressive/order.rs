@@ -6,6 +6,7 @@
 
 use super::{ProgressiveMesh, SplitKind};
 use crate::aif::{NONE, Positions};
+use std::sync::Arc;
 
 /// The order asked for is none of all splits, or puts a split before one it depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -96,6 +97,7 @@ impl ProgressiveMesh {
             face_group: by_face(&self.face_group),
             wires: self.wires.clone(),
             levels: vec![0, n as u32],
+            bounds: self.bounds.as_ref().and_then(|b| b.reordered(order)).map(Arc::new),
             ..Default::default()
         };
         out.levels.dedup();

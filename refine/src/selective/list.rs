@@ -1,7 +1,7 @@
 //! Splits that may come next, with what is needed to decide about each in one run of memory.
 
 use crate::aif::NONE;
-use crate::hierarchy::{Cone, Hierarchy, unpack};
+use crate::hierarchy::{Hierarchy, unpack};
 use glam::Vec3;
 
 /// A split and its bounds, ready to be decided about, 44 B.
@@ -11,7 +11,7 @@ pub(super) struct Entry {
     pub(super) radius: f32,
     pub(super) error: f32,
     pub(super) split: u32,
-    /// The normal cone's axis, and cosine and sine of its half angle. Stored cones are wider by 2e-5 rad, so that rounding to f32 does not show.
+    /// The normal cone's axis, and cosine and sine of its half angle. Stored cones are wider by 3e-4 rad, so that rounding to f32 does not show.
     pub(super) axis: Vec3,
     pub(super) cos: f32,
     pub(super) sin: f32,
@@ -19,12 +19,12 @@ pub(super) struct Entry {
 
 impl Entry {
     pub(super) fn of(h: &Hierarchy, i: u32) -> Entry {
-        let (b, k) = (&h.bounds, i as usize);
-        let (axis, cos, sin) = Cone { axis: b.axis[k], angle: b.angle[k] }.unpack_parts();
+        let b = h.bounds.of[i as usize];
+        let (axis, cos, sin) = b.cone.unpack_parts();
         Entry {
             centre: h.local_centre(i),
-            radius: unpack(b.radius[k]),
-            error: unpack(b.error[k]),
+            radius: unpack(b.radius),
+            error: unpack(b.error),
             split: i,
             axis,
             cos,

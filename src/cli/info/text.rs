@@ -21,6 +21,7 @@ impl ProgressiveInfo {
                 ("attributes", b.attributes),
                 ("materials and groups", b.faces),
                 ("errors", b.errors),
+                ("bounds", b.bounds),
                 ("order", b.order),
                 ("scene", b.scene),
                 ("directory", b.head),

@@ -1,0 +1,113 @@
+//! Bounds of the splits of a chunk, each expected to be like that of the split before.
+
+use super::coder::{Coder, Decoder, Encoder, Number};
+use crate::hierarchy::{Bounds, Cone, Guarantee, Packed};
+use glam::DVec3;
+use std::ops::Range;
+
+/// Bytes in memory of the bounds of so many splits.
+pub(super) fn raw_bytes(splits: usize) -> u64 {
+    32 + 8 * splits as u64
+}
+
+/// The parts of a split's bounds: error, radius, axis, angle.
+type Parts = [u32; 5];
+
+fn parts(b: Packed) -> Parts {
+    let c = b.cone.0;
+    [b.error as u32, b.radius as u32, c & 0x3ff, c >> 10 & 0x3ff, c >> 20]
+}
+
+fn packed([error, radius, x, y, angle]: Parts) -> Packed {
+    Packed { error: error as u16, radius: radius as u16, cone: Cone(x | y << 10 | angle << 20) }
+}
+
+/// Bits of each part.
+const BITS: [u32; 5] = [16, 16, 10, 10, 12];
+
+fn code<C: Coder>(c: &mut C, models: &mut [Number; 5], last: &mut Parts, value: Parts) {
+    for k in 0..5 {
+        // Differences wrap around, so that whatever is read is in range.
+        let shift = 32 - BITS[k];
+        let difference = (value[k].wrapping_sub(last[k]) << shift) as i32 >> shift;
+        let difference = c.signed(&mut models[k], difference as i64);
+        last[k] = last[k].wrapping_add(difference as u32) & ((1 << BITS[k]) - 1);
+    }
+}
+
+/// The bytes of a chunk.
+pub(super) fn write(bounds: &Bounds, range: Range<usize>) -> Option<Vec<u8>> {
+    let (origin, diagonal) = bounds.extent();
+    let mut out = vec![bounds.guarantee().code()];
+    for x in origin.to_array().into_iter().chain([diagonal]) {
+        out.extend_from_slice(&x.to_le_bytes());
+    }
+    let mut e = Encoder::default();
+    let (mut models, mut last) = Default::default();
+    for &b in bounds.of.get(range)? {
+        code(&mut e, &mut models, &mut last, parts(b));
+    }
+    e.finish(&mut out);
+    Some(out)
+}
+
+/// The bounds of `count` splits; `None` for damage.
+pub(super) fn read(bytes: &[u8], count: usize, raw: u64) -> Option<Bounds> {
+    let (&[guarantee], rest) = bytes.split_first_chunk::<1>()?;
+    let (head, stream) = rest.split_first_chunk::<32>()?;
+    let [x, y, z, diagonal] = [0, 1, 2, 3].map(|k| {
+        let mut eight = [0; 8];
+        eight.copy_from_slice(&head[8 * k..8 * k + 8]);
+        f64::from_le_bytes(eight)
+    });
+    let origin = DVec3::new(x, y, z);
+    if raw != raw_bytes(count) || !origin.is_finite() || !(diagonal.is_finite() && diagonal >= 0.0) {
+        return None;
+    }
+    let mut d = Decoder::new(stream)?;
+    let (mut models, mut last) = Default::default();
+    // The directory promises no more than 64 times the bytes that are there.
+    let mut of = Vec::with_capacity(count);
+    for _ in 0..count {
+        code(&mut d, &mut models, &mut last, Parts::default());
+        of.push(packed(last));
+        if d.spent() {
+            return None;
+        }
+    }
+    Some(Bounds { origin, diagonal, guarantee: Guarantee::from_code(guarantee)?, of })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn what_was_written_is_read_and_less_is_damage(
+            of in prop::collection::vec((any::<u16>(), any::<u16>(), any::<u32>()), 1..60),
+            code in 0u8..3,
+            origin in prop::array::uniform3(-1e9..1e9f64),
+            from in 0usize..60,
+        ) {
+            let packed = |&(error, radius, cone): &(u16, u16, u32)| Packed { error, radius, cone: Cone(cone) };
+            let bounds = Bounds {
+                origin: DVec3::from_array(origin),
+                diagonal: 7.5,
+                guarantee: Guarantee::from_code(code).unwrap(),
+                of: of.iter().map(packed).collect(),
+            };
+            let range = from.min(of.len() - 1)..of.len();
+            let bytes = write(&bounds, range.clone()).unwrap();
+            let raw = raw_bytes(range.len());
+            prop_assert_eq!(read(&bytes, range.len(), raw), Some(bounds.slice(range.clone())));
+            prop_assert_eq!(read(&bytes, range.len() + 200, raw_bytes(range.len() + 200)), None);
+            prop_assert_eq!(read(&bytes, range.len(), raw + 1), None);
+            for end in 0..33 {
+                prop_assert_eq!(read(&bytes[..end], range.len(), raw), None);
+            }
+            prop_assert_eq!(write(&bounds, 0..of.len() + 1), None);
+        }
+    }
+}
