@@ -2,9 +2,11 @@
 
 mod flight;
 mod judge;
+mod morph;
 
 pub use flight::{FlightPath, PathError, circle, lemniscate, recorded};
 pub use judge::{Judge, Judgement};
+pub use morph::Geomorph;
 
 use crate::progressive::{Leftover, ProgressiveScene};
 use crate::refine::hierarchy::{Hierarchy, Options};
@@ -13,6 +15,7 @@ use crate::refine::selective::{Changes, Cull, Done, Lens, LensError, Limits, Vie
 use crate::refine::view::Camera;
 use crate::scene::Scene;
 use glam::{DMat4, DVec3};
+use morph::Morphs;
 use std::sync::Arc;
 
 /// A scene with a [`View`] of each mesh. A mesh that stands in several places is as fine as the most demanding of them asks.
@@ -23,6 +26,7 @@ pub struct SelectiveScene {
     views: Vec<View>,
     /// For each mesh where it stands.
     places: Vec<Vec<DMat4>>,
+    morphs: Morphs,
 }
 
 /// A mesh of a scene cannot be refined selectively.
@@ -70,22 +74,54 @@ impl SelectiveScene {
             h.map(|h| View::new(Arc::new(h))).map_err(|source| SelectiveError::Damage { mesh, source })
         });
         let views = each.collect::<Result<_, _>>()?;
-        Ok(SelectiveScene { views, places, shell: scene.shell, leftovers: scene.leftovers })
+        let morphs = Morphs::default();
+        Ok(SelectiveScene { views, places, shell: scene.shell, leftovers: scene.leftovers, morphs })
     }
 
-    /// The views, one a mesh.
+    /// The views, one a mesh: what the last frame asked for.
     pub fn views(&self) -> &[View] {
         &self.views
     }
 
+    /// From the next frame on changes that can be seen show themselves so; `None`: at once. What is shown then is not [`SelectiveScene::views`] until they came
+    /// to rest, but [`SelectiveScene::shown`].
+    pub fn set_geomorph(&mut self, geomorph: Option<Geomorph>) {
+        self.morphs = Morphs::new(geomorph);
+    }
+
+    /// Vertices of the last frame that are not where they will be.
+    pub fn morphing(&self) -> usize {
+        self.morphs.morphing()
+    }
+
+    /// The mesh that is shown of mesh `m`. Panics if there is no such mesh.
+    pub fn shown(&self, m: usize) -> &View {
+        self.morphs.view(&self.views, m)
+    }
+
+    /// The vertices of [`SelectiveScene::shown`] that are drawn elsewhere than it has them, ascending, and where, in the mesh's own coordinates.
+    pub fn displaced(&self, m: usize) -> &[(u32, DVec3)] {
+        self.morphs.displaced(m)
+    }
+
+    /// Where each mesh stands.
+    pub fn placements(&self) -> &[Vec<DMat4>] {
+        &self.places
+    }
+
     /// Faces shown, of all meshes, each counted once.
     pub fn face_count(&self) -> usize {
+        (0..self.views.len()).map(|m| self.shown(m).face_count()).sum()
+    }
+
+    /// Faces that the last frame asked for: [`SelectiveScene::face_count`], but for what [`Geomorph::Time`] still shows.
+    pub fn needed_faces(&self) -> usize {
         self.views.iter().map(View::face_count).sum()
     }
 
     /// Vertices shown.
     pub fn vertex_count(&self) -> usize {
-        self.views.iter().map(View::vertex_count).sum()
+        (0..self.views.len()).map(|m| self.shown(m).vertex_count()).sum()
     }
 
     /// Faces at full detail.
@@ -117,7 +153,8 @@ impl SelectiveScene {
         all
     }
 
-    /// Adapts all meshes to a camera. The limit of faces is for all of them; the others are for each.
+    /// Adapts all meshes to a camera. The limit of faces is for all of them (of those needed: with [`Geomorph::Time`] more may be shown until what is undone is gone); the
+    /// others are for each.
     ///
     /// Errors: a tolerance that is none; a mesh placed by a matrix that flattens it.
     pub fn adapt(
@@ -128,9 +165,9 @@ impl SelectiveScene {
         limits: &Limits<'_>,
     ) -> Result<Done, SelectiveError> {
         let mut all = Done { complete: true, ..Done::default() };
-        let lenses = self.lenses(camera, tau, cull)?;
+        let lenses = self.lenses(camera, tau / self.morphs.band(), cull)?;
         for (m, lenses) in lenses.iter().enumerate() {
-            let others = self.face_count() - self.views[m].face_count();
+            let others = self.needed_faces() - self.views[m].face_count();
             let limits = Limits { faces: limits.faces.saturating_sub(others), ..*limits };
             let done = self.views[m].adapt_to_all(lenses, &limits);
             all.splits += done.splits;
@@ -138,6 +175,9 @@ impl SelectiveScene {
             all.forced += done.forced;
             all.refused += done.refused;
             all.complete &= done.complete;
+        }
+        if let Some([splits, collapses]) = self.morphs.follow(&self.views, &lenses) {
+            (all.splits, all.collapses) = (splits, collapses);
         }
         Ok(all)
     }
@@ -191,17 +231,21 @@ impl SelectiveScene {
 
     /// What changed in the buffers of each mesh since this was last called.
     pub fn take_changes(&mut self) -> Vec<Changes> {
-        self.views.iter_mut().map(View::take_changes).collect()
+        self.morphs.take_changes(&mut self.views)
     }
 
     /// The scene as it is shown. At full detail it is the scene that was made progressive, bit for bit. O(n).
     pub fn to_scene(&self) -> Scene {
         let mut scene = self.shell.clone();
         scene.meshes.resize_with(self.views.len(), Default::default);
-        let whole = |v: &View| v.vertex_count() == v.hierarchy().mesh().vertices();
-        let all = self.views.iter().all(whole);
-        for (i, view) in self.views.iter().enumerate() {
-            let geometry = view.to_input();
+        let whole = |m: usize| {
+            let v = self.shown(m);
+            v.vertex_count() == v.hierarchy().mesh().vertices() && self.displaced(m).is_empty()
+        };
+        let all = (0..self.views.len()).all(whole);
+        for i in 0..self.views.len() {
+            let view = self.shown(i);
+            let geometry = view.to_input_with(self.displaced(i));
             let ordered = view.hierarchy().mesh().order.is_some();
             scene.meshes[i].geometry = match self.leftovers.get(i).filter(|_| all && ordered) {
                 Some(left) => left.put_back(geometry),
@@ -214,11 +258,11 @@ impl SelectiveScene {
     /// The triangles shown, in the world: three corners each.
     pub fn triangles(&self) -> Vec<[DVec3; 3]> {
         let mut out = Vec::new();
-        for (view, places) in self.views.iter().zip(&self.places) {
+        for (m, places) in self.places.iter().enumerate() {
+            let (view, displaced) = (self.shown(m), self.displaced(m));
             let slots = (0..view.indices().len()).filter(|&s| view.face_in(s).is_some());
-            let own: Vec<[DVec3; 3]> = slots
-                .map(|s| view.indices()[s].map(|w| view.position(view.wedge_vertex(w)).unwrap_or_default()))
-                .collect();
+            let at = |w: u32| morph::place(view, displaced, view.wedge_vertex(w)).unwrap_or_default();
+            let own: Vec<[DVec3; 3]> = slots.map(|s| view.indices()[s].map(at)).collect();
             for m in places {
                 out.extend(own.iter().map(|t| t.map(|p| m.transform_point3(p))));
             }
@@ -230,9 +274,10 @@ impl SelectiveScene {
     pub fn visible_vertices(&self, camera: &Camera) -> usize {
         let frustum = camera.frustum();
         let mut count = 0;
-        for (view, places) in self.views.iter().zip(&self.places) {
+        for (m, places) in self.places.iter().enumerate() {
+            let (view, displaced) = (self.shown(m), self.displaced(m));
             let all = 0..view.hierarchy().mesh().vertices() as u32;
-            for p in all.filter_map(|v| view.position(v)) {
+            for p in all.filter_map(|v| morph::place(view, displaced, v)) {
                 count += places.iter().filter(|m| frustum.contains(m.transform_point3(p))).count();
             }
         }
@@ -241,9 +286,10 @@ impl SelectiveScene {
 
     /// Bytes that all views share, bytes of the views that grow with what is shown, and bytes of their tables over the finest meshes.
     pub fn bytes(&self) -> [usize; 3] {
-        self.views.iter().fold([0; 3], |[s, a, t], v| {
+        let shared = self.views.iter().map(|v| v.hierarchy().bytes()).sum();
+        self.views.iter().chain(self.morphs.own_views()).fold([shared, 0, 0], |[s, a, t], v| {
             let (shown, tables) = v.bytes();
-            [s + v.hierarchy().bytes(), a + shown, t + tables]
+            [s, a + shown, t + tables]
         })
     }
 }

@@ -84,6 +84,8 @@ fn wrong_cameras_and_paths_are_named() {
         ("fly in.ply --path away.json", 3, "no frame sees anything"),
         ("fly in.ply --path circle --frames 0", 2, "1 or more"),
         ("fly in.ply --path circle --hysteresis 0", 2, "0.1 to 1"),
+        ("fly in.ply --path circle --geomorph=time:0", 2, "time:FRAMES"),
+        ("fly in.ply --path circle --geomorph=error:1", 2, "error:BAND"),
     ] {
         let run = p.run(arguments);
         assert_eq!(run.code, code, "{arguments}: {}", run.stderr);
@@ -133,4 +135,45 @@ fn a_flight_reports_every_frame_and_what_is_shown_is_within_the_tolerance() {
             && p.exists("shots/frame00002.png")
             && !p.exists("shots/frame00001.png")
     );
+}
+
+#[test]
+fn visible_changes_morph_and_a_camera_that_stands_still_shows_what_it_would_without() {
+    let p = Place::new();
+    p.generate("scan", "in.ply", 4000);
+    p.done("encode in.ply in.pm -q");
+    // Once around in part, then still.
+    let eye = |k: usize| {
+        let (sin, cos) = (0.05 * k.min(12) as f64).sin_cos();
+        CAMERA.replace("0.2, 0.3, 2.2", &format!("{}, 0.3, {}", 2.2 * sin, 2.2 * cos))
+    };
+    let path: Vec<String> = (0..24).map(eye).collect();
+    p.write("path.json", format!("[{}]", path.join(",")));
+    let fly = |flags: &str| {
+        let command =
+            format!("fly in.pm --path path.json --tau 2 --measure-every 1 --samples 2000 --json -q");
+        p.done(&format!("{command} {flags}")).json()["frames"].as_array().unwrap().clone()
+    };
+    let n = |f: &Value, k: &str| f[k].as_u64().unwrap();
+    let plain = fly("");
+    assert!(plain.iter().all(|f| n(f, "morphing") == 0));
+    let timed = fly("--geomorph=time:8");
+    let changes: u64 = plain[1..].iter().map(|f| n(f, "vsplits") + n(f, "ecols")).sum();
+    assert!(changes > 20, "{changes}");
+    // From the first frame on; what is undone is there for longer; at rest eight frames after the last change.
+    assert!(timed[1..=12].iter().filter(|f| n(f, "morphing") > 0).count() > 6);
+    assert!(plain.iter().zip(&timed).all(|(a, b)| n(a, "faces") <= n(b, "faces")));
+    assert!(plain.iter().zip(&timed).any(|(a, b)| n(a, "faces") < n(b, "faces")));
+    for k in 20..24 {
+        assert_eq!((n(&timed[k], "morphing"), &timed[k]["faces"]), (0, &plain[k]["faces"]));
+        assert_eq!(timed[k]["measured"], plain[k]["measured"]);
+    }
+    // By error: the same in every frame that has the same camera, and finer than the tolerance asks for.
+    let by_error = fly("--geomorph=error:2");
+    assert!(by_error.iter().all(|f| n(f, "morphing") > 0));
+    assert!(by_error.iter().zip(&plain).all(|(a, b)| n(a, "faces") > n(b, "faces")));
+    assert_eq!(by_error[12]["morphing"], by_error[23]["morphing"]);
+    assert_eq!(by_error[12]["measured"], by_error[23]["measured"]);
+    let most = by_error.iter().map(|f| f["measured"]["max_pixels"].as_f64().unwrap()).fold(0.0, f64::max);
+    assert!(most <= 2.0, "{most}");
 }

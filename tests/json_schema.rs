@@ -576,6 +576,7 @@ struct Fly {
     vsplits: FlyStatistics,
     ecols: FlyStatistics,
     us: FlyStatistics,
+    morphing: FlyStatistics,
     dirty_index_bytes: FlyStatistics,
     #[serde(deserialize_with = "present")]
     operations_per_second: Option<f64>,
@@ -618,6 +619,7 @@ struct FlyFrame {
     #[serde(deserialize_with = "present")]
     tau: Option<f64>,
     complete: bool,
+    morphing: usize,
     visible_vertices: usize,
     dirty_index_bytes: usize,
     dirty_wedges: usize,
@@ -659,6 +661,7 @@ fn selective_commands_print_one_object_with_the_documented_fields() {
     ))
     .unwrap();
     assert_eq!((f.command.as_str(), f.frame_count, f.frames.len(), f.above), ("fly", 4, 4, 0));
+    assert!(f.frames.iter().all(|f| f.morphing == 0) && f.morphing.max == 0.0);
     assert!(f.frames[2].measured.as_ref().is_some_and(|m| m.samples > 100) && f.frames[1].measured.is_none());
 }
 

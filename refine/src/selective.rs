@@ -19,12 +19,14 @@ mod list;
 mod morph;
 mod output;
 mod regulator;
+mod timed;
 
 pub use adapt::{Done, Limits};
 pub use changes::Changes;
 pub(crate) use front::Front;
 pub use lens::{Cull, Lens, LensError};
 pub use regulator::Regulator;
+pub use timed::{Followed, TimedMorph};
 
 use crate::aif::NONE;
 use crate::hierarchy::Hierarchy;

@@ -1,11 +1,11 @@
 //! `progmesh clip IN OUT`.
 
 use super::Failure;
-use super::args::{Input, Output};
+use super::args::Input;
 use super::camera;
-use super::common::{self, Warnings, thousands};
+use super::common::{Warnings, thousands};
 use super::control::Interrupt;
-use super::picture::PictureArgs;
+use super::ending::Ending;
 use glam::{DVec3, DVec4};
 use progmesh::pipeline::count;
 use progmesh::refine::view::clip::box_planes;
@@ -27,7 +27,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     input: Input,
     #[command(flatten)]
-    output: Output,
+    ending: Ending,
     /// Keep what is in this box
     #[arg(long = "box", value_name = "X0,Y0,Z0,X1,Y1,Z1", group = "region", value_parser = numbers::<6>, allow_hyphen_values = true)]
     corners: Option<[f64; 6]>,
@@ -40,14 +40,6 @@ pub(crate) struct Args {
     /// Close the cuts of closed meshes
     #[arg(long)]
     cap: bool,
-    #[command(flatten)]
-    picture: PictureArgs,
-    /// Print one JSON object about the run on standard output (see docs/json.md)
-    #[arg(long)]
-    json: bool,
-    /// Say nothing but errors
-    #[arg(long, short)]
-    quiet: bool,
 }
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
@@ -65,57 +57,35 @@ fn plane(text: &str) -> Result<[f64; 4], String> {
 impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
-        self.output.leave_room_for(self.json)?;
-        let mut warnings = Warnings::new(self.quiet);
-        let format = self.output.format(&mut warnings)?;
-        let mut drawing = self.picture.drawing()?;
-        let planes = self.planes(&mut warnings)?;
+        let mut results = self.ending.begin()?;
+        let planes = self.planes(&mut results.warnings)?;
         let interrupt = Interrupt::watch();
-        let loaded = self.input.read(&mut warnings)?;
+        let loaded = self.input.read(&mut results.warnings)?;
         let (mut scene, read) = (loaded.decoded.scene, start.elapsed().as_secs_f64());
         interrupt.be_graceful();
         let file = self.input.name();
-        let failed = |e: String| Failure::Input(format!("{file}: {e}"));
         let (before, vertices_in) = (scene.unique_triangles(), vertices(&scene));
-        if let Some(d) = &mut drawing {
-            d.add(&scene).map_err(|e| failed(e.to_string()))?;
-        }
+        results.draw(&scene)?;
         let clipping = Instant::now();
-        let done = clip_scene(&mut scene, &planes, self.cap).map_err(|e| failed(e.to_string()))?;
+        let done = clip_scene(&mut scene, &planes, self.cap);
+        let done = done.map_err(|e| Failure::Input(format!("{file}: {e}")))?;
         let clip = clipping.elapsed().as_secs_f64();
-        warnings.say(self.surprises(&done, scene.unique_triangles() == 0).map(|w| format!("{file}: {w}")));
-        if interrupt.is_set() {
-            return Err(Failure::Interrupted);
-        }
-        let draw = match &mut drawing {
-            Some(d) => {
-                d.add(&scene).map_err(|e| failed(e.to_string()))?;
-                d.write()?;
-                d.seconds
-            }
-            None => 0.0,
-        };
-        let writing = Instant::now();
-        self.output.write(format, &scene, &interrupt, &mut warnings)?;
-        let write = writing.elapsed().as_secs_f64();
-        if !self.quiet {
+        results
+            .warnings
+            .say(self.surprises(&done, scene.unique_triangles() == 0).map(|w| format!("{file}: {w}")));
+        let spent = self.ending.finish(&mut results, &scene, &interrupt)?;
+        self.ending.say(|| {
             let capped = match done.loops {
                 0 => String::new(),
                 n => format!(", {} closed with {}", count(n, "cut"), count(done.cap_triangles, "triangle")),
             };
             let (before, after) = (thousands(before), thousands(scene.unique_triangles()));
-            common::note(&format!(
-                "{file}: {before} -> {after} triangles; {} cut{capped}",
-                count(done.cut_faces, "face")
-            ));
-        }
-        if !self.json {
-            return Ok(());
-        }
-        common::print_json(&Report {
+            format!("{file}: {before} -> {after} triangles; {} cut{capped}", count(done.cut_faces, "face"))
+        });
+        self.ending.print(&Report {
             command: "clip",
             from: loaded.format.extension(),
-            to: format.extension(),
+            to: results.format.extension(),
             planes: planes.iter().map(|p| p.to_array()).collect(),
             instances: Instances { inside: done.inside, cut: done.cut, outside: done.outside },
             vertices: [vertices_in, vertices(&scene)],
@@ -127,8 +97,14 @@ impl Args {
                 triangles: done.cap_triangles,
                 open_edges: done.open_edges,
             }),
-            seconds: Seconds { read, clip, draw, write, total: start.elapsed().as_secs_f64() },
-            warnings: warnings.all,
+            seconds: Seconds {
+                read,
+                clip,
+                draw: spent.draw,
+                write: spent.write,
+                total: start.elapsed().as_secs_f64(),
+            },
+            warnings: results.warnings.all,
         })
     }
 

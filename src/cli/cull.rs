@@ -1,11 +1,11 @@
 //! `progmesh cull IN OUT --camera CAM`.
 
 use super::Failure;
-use super::args::{Input, Output};
+use super::args::Input;
 use super::camera;
-use super::common::{self, Warnings, thousands};
+use super::common::thousands;
 use super::control::Interrupt;
-use super::picture::PictureArgs;
+use super::ending::Ending;
 use progmesh::views::{CullReport, cull_scene};
 use serde::Serialize;
 use std::time::Instant;
@@ -23,70 +23,39 @@ pub(crate) struct Args {
     #[command(flatten)]
     input: Input,
     #[command(flatten)]
-    output: Output,
+    ending: Ending,
     /// The camera: CAM.json (docs/camera.md), or scene.glb#NAME
     #[arg(long, value_name = "CAM")]
     camera: String,
-    #[command(flatten)]
-    picture: PictureArgs,
-    /// Print one JSON object about the run on standard output (see docs/json.md)
-    #[arg(long)]
-    json: bool,
-    /// Say nothing but errors
-    #[arg(long, short)]
-    quiet: bool,
 }
 
 impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
-        self.output.leave_room_for(self.json)?;
-        let mut warnings = Warnings::new(self.quiet);
-        let format = self.output.format(&mut warnings)?;
-        let mut drawing = self.picture.drawing()?;
-        let camera = camera::read(&self.camera, &mut warnings)?;
+        let mut results = self.ending.begin()?;
+        let camera = camera::read(&self.camera, &mut results.warnings)?;
         let interrupt = Interrupt::watch();
         let reading = Instant::now();
-        let loaded = self.input.read(&mut warnings)?;
+        let loaded = self.input.read(&mut results.warnings)?;
         let (mut scene, read) = (loaded.decoded.scene, reading.elapsed().as_secs_f64());
         interrupt.be_graceful();
         let file = self.input.name();
-        let failed = |e: String| Failure::Input(format!("{file}: {e}"));
         let before = scene.unique_triangles();
-        if let Some(d) = &mut drawing {
-            d.add(&scene).map_err(|e| failed(e.to_string()))?;
-        }
+        results.draw(&scene)?;
         let culling = Instant::now();
-        let done = cull_scene(&mut scene, &camera).map_err(|e| failed(e.to_string()))?;
+        let done = cull_scene(&mut scene, &camera);
+        let done = done.map_err(|e| Failure::Input(format!("{file}: {e}")))?;
         let cull = culling.elapsed().as_secs_f64();
         let after = scene.unique_triangles();
         let nothing = (after == 0 && before > 0).then(|| format!("{file}: nothing is in view"));
         let skinned = (done.skinned > 0).then(|| format!("{file}: meshes with a skin are kept whole"));
-        warnings.say(nothing.into_iter().chain(skinned));
-        if interrupt.is_set() {
-            return Err(Failure::Interrupted);
-        }
-        let draw = match &mut drawing {
-            Some(d) => {
-                d.add(&scene).map_err(|e| failed(e.to_string()))?;
-                d.write()?;
-                d.seconds
-            }
-            None => 0.0,
-        };
-        let writing = Instant::now();
-        self.output.write(format, &scene, &interrupt, &mut warnings)?;
-        let write = writing.elapsed().as_secs_f64();
-        if !self.quiet {
-            common::note(&said(&file, &done));
-        }
-        if !self.json {
-            return Ok(());
-        }
-        common::print_json(&Report {
+        results.warnings.say(nothing.into_iter().chain(skinned));
+        let spent = self.ending.finish(&mut results, &scene, &interrupt)?;
+        self.ending.say(|| said(&file, &done));
+        self.ending.print(&Report {
             command: "cull",
             from: loaded.format.extension(),
-            to: format.extension(),
+            to: results.format.extension(),
             instances: Instances {
                 all: done.instances,
                 outside: done.instances_outside,
@@ -105,8 +74,14 @@ impl Args {
                 kept: done.faces_kept(),
             },
             triangles: [before, after],
-            seconds: Seconds { read, cull, draw, write, total: start.elapsed().as_secs_f64() },
-            warnings: warnings.all,
+            seconds: Seconds {
+                read,
+                cull,
+                draw: spent.draw,
+                write: spent.write,
+                total: start.elapsed().as_secs_f64(),
+            },
+            warnings: results.warnings.all,
         })
     }
 }

@@ -1,10 +1,10 @@
 //! `progmesh extract IN OUT --camera CAM`.
 
-use super::args::{self, Input, Output};
+use super::args::{self, Input};
 use super::common::{self, Warnings, short, thousands};
 use super::control::{Interrupt, Progress};
+use super::ending::Ending;
 use super::method::Making;
-use super::picture::PictureArgs;
 use super::{Failure, camera};
 use clap::ValueEnum;
 use progmesh::pipeline::build_progressive;
@@ -33,7 +33,7 @@ pub(crate) struct Args {
     #[command(flatten)]
     input: Input,
     #[command(flatten)]
-    output: Output,
+    ending: Ending,
     /// The camera: CAM.json (docs/camera.md), or scene.glb, or scene.glb#NAME
     #[arg(long, value_name = "CAM")]
     camera: String,
@@ -41,14 +41,6 @@ pub(crate) struct Args {
     needs: Needs,
     #[command(flatten)]
     making: Making,
-    #[command(flatten)]
-    picture: PictureArgs,
-    /// Print one JSON object about the run on standard output (see docs/json.md)
-    #[arg(long)]
-    json: bool,
-    /// Say nothing but errors
-    #[arg(long, short)]
-    quiet: bool,
 }
 
 /// What a view needs.
@@ -140,36 +132,24 @@ pub(crate) fn make(
 impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
-        self.output.leave_room_for(self.json)?;
-        let mut warnings = Warnings::new(self.quiet);
-        let format = self.output.format(&mut warnings)?;
-        let mut drawing = self.picture.drawing()?;
-        let camera = camera::read(&self.camera, &mut warnings)?;
+        let mut results = self.ending.begin()?;
+        let camera = camera::read(&self.camera, &mut results.warnings)?;
+        results.through(View::of_camera(&camera));
         let file = self.input.name();
         let interrupt = Interrupt::watch();
         let (report, full) = common::in_pool(self.making.collapsing.threads, || {
-            let mut made = make(&self.input, &self.making, self.quiet, &interrupt, &mut warnings)?;
+            let mut made =
+                make(&self.input, &self.making, self.ending.quiet, &interrupt, &mut results.warnings)?;
             let refining = Instant::now();
             let most = self.needs.budget_faces;
             let tau = made.scene.extract(&camera, self.needs.tau, self.needs.cull(), most);
             let tau = tau.map_err(|e| Failure::Input(format!("{file}: {e}")))?;
             let refine = refining.elapsed().as_secs_f64();
-            let scene = made.scene.to_scene();
-            if interrupt.is_set() {
-                return Err(Failure::Interrupted);
-            }
-            if let Some(d) = &mut drawing {
-                d.through(View::of_camera(&camera));
-                d.add(&scene).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
-            }
-            let writing = Instant::now();
-            self.output.write(format, &scene, &interrupt, &mut warnings)?;
-            let write = writing.elapsed().as_secs_f64();
-            drawing.as_mut().map_or(Ok(()), |d| d.write())?;
+            let spent = self.ending.finish(&mut results, &made.scene.to_scene(), &interrupt)?;
             let splits = made.scene.views().iter().map(|v| v.applied().count()).sum();
             let report = Report {
                 command: "extract",
-                to: format.extension(),
+                to: results.format.extension(),
                 tau: tau.is_finite().then_some(tau),
                 faces: made.scene.face_count(),
                 vertices: made.scene.vertex_count(),
@@ -181,17 +161,17 @@ impl Args {
                     read: made.read,
                     bounds: made.bounds,
                     refine,
-                    write,
+                    write: spent.write,
                     total: start.elapsed().as_secs_f64(),
                 },
                 warnings: vec![],
             };
             Ok((report, made.scene.full_faces()))
         })?;
-        let report = Report { warnings: warnings.all, ..report };
-        if !self.quiet {
+        let report = Report { warnings: results.warnings.all, ..report };
+        self.ending.say(|| {
             let at = report.tau.map_or("inf".into(), short);
-            common::note(&format!(
+            format!(
                 "{file}: {} of {} faces at {at} pixels; {:.3} s (read {:.3}, bounds {:.3}, refine {:.3}, write {:.3})",
                 thousands(report.faces),
                 thousands(full),
@@ -200,11 +180,9 @@ impl Args {
                 report.seconds.bounds,
                 report.seconds.refine,
                 report.seconds.write
-            ));
-        }
-        if self.json {
-            common::print_json(&report)?;
-        }
+            )
+        });
+        self.ending.print(&report)?;
         match self.needs.budget_faces {
             Some(n) if report.faces > n => Err(Failure::Missed(format!(
                 "{file}: {} faces left, more than the {} asked for: that is the base, nothing is coarser",

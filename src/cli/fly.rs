@@ -1,5 +1,6 @@
 //! `progmesh fly IN --path PATH`.
 
+mod geomorph;
 mod report;
 
 use super::args::{self, Input};
@@ -12,7 +13,7 @@ use progmesh::io::files;
 use progmesh::refine::selective::{Limits, Regulator};
 use progmesh::refine::view::Camera;
 use progmesh::report::{Picture, Style, Surface, View, render};
-use progmesh::selective::{FlightPath, Judge, SelectiveScene, circle, lemniscate, recorded};
+use progmesh::selective::{FlightPath, Geomorph, Judge, SelectiveScene, circle, lemniscate, recorded};
 use report::{Frame, Measured, Memory, Report};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -28,8 +29,9 @@ Examples:
   progmesh fly bunny.pm --path lemniscate --frames 2000 --budget-faces 20000 --json > flight.json
   progmesh fly terrain.obj --path canyon.frames --path-scale 1024 --budget-us 500
   progmesh fly scan.ply --path cams.json --png-every 60 --png-to shots
+  progmesh fly dragon.ply --path circle --geomorph=time:20 --measure-every 10
 
-Exit code 1 means: done, but the measured error came above --tau in a frame that had come to rest.")]
+Exit code 1 means: done, but the measured error came above --tau in a frame that had come to rest, with no vertex on the way.")]
 pub(crate) struct Args {
     #[command(flatten)]
     input: Input,
@@ -53,6 +55,13 @@ pub(crate) struct Args {
     #[arg(long, value_name = "H", value_parser = hysteresis, default_value = "1", allow_negative_numbers = true,
           help_heading = "View")]
     hysteresis: f64,
+    /// Let changes that can be seen show themselves smoothly: time[:FRAMES] or error[:BAND] [default: time:12]
+    ///
+    /// time: vertices move to their new places over so many frames, and what is undone stays for as long. error: a vertex begins to move where its error could take up
+    /// tau / BAND and is in place at tau, which takes the faces of tau / BAND; BAND is more than 1 and 2 if not said. What is out of sight jumps.
+    #[arg(long, value_name = "HOW", num_args = 0..=1, require_equals = true, default_missing_value = "time",
+          value_parser = geomorph::parse, help_heading = "View")]
+    geomorph: Option<Geomorph>,
     /// Measure the error that is shown on every Kth frame
     #[arg(long, value_name = "K", value_parser = args::positive, allow_negative_numbers = true, help_heading = "Report")]
     measure_every: Option<usize>,
@@ -109,6 +118,7 @@ impl Args {
             let made = extract::make(&self.input, &self.making, self.quiet, &interrupt, &mut warnings)?;
             let path = self.cameras(&made.scene, &bytes)?;
             let (seconds, mut scene) = ([made.read, made.bounds], made.scene);
+            scene.set_geomorph(self.geomorph);
             let frames = self.fly(&mut scene, &path, &interrupt)?;
             if frames.iter().all(|f| f.visible_vertices == 0) {
                 let (lo, hi) = scene.bounds().unwrap_or_default();
@@ -193,9 +203,8 @@ impl Args {
             };
             let done = scene.adapt(camera, tau, self.needs.cull(), &limits).map_err(|e| failed(&e))?;
             let us = start.elapsed().as_secs_f64() * 1e6;
-            let faces = scene.face_count();
             if let Some(r) = &mut regulator {
-                r.note(faces, done.complete);
+                r.note(scene.needed_faces(), done.complete);
             }
             let changes = scene.take_changes();
             let measured = match &judge {
@@ -213,13 +222,14 @@ impl Args {
                 self.draw(scene, camera, k)?;
             }
             frames.push(Frame {
-                faces,
+                faces: scene.face_count(),
                 vertices: scene.vertex_count(),
                 vsplits: done.splits,
                 ecols: done.collapses,
                 us,
                 tau: tau.is_finite().then_some(tau),
                 complete: done.complete,
+                morphing: scene.morphing(),
                 visible_vertices: scene.visible_vertices(camera),
                 dirty_index_bytes: changes.iter().map(|c| c.index_bytes()).sum(),
                 dirty_wedges: changes.iter().map(|c| c.wedges.len()).sum(),

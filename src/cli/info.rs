@@ -77,7 +77,7 @@ impl Args {
             }
             meshes.push(MeshInfo::of(&scene, i, in_file, &mesh, &report));
         }
-        drawn.transpose().map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+        drawn.transpose()?;
         if let Some(d) = &mut drawing {
             d.write()?;
         }

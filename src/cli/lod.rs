@@ -10,7 +10,6 @@ use progmesh::io::gltf::encode_levels;
 use progmesh::io::{Format, files};
 use progmesh::pipeline::build_progressive;
 use progmesh::progressive::{Detail, ProgressiveScene};
-use progmesh::report::SurfaceError;
 use progmesh::scene::Scene;
 use progmesh::simplify::Stop;
 use serde::Serialize;
@@ -108,7 +107,8 @@ impl Args {
             interrupt.be_graceful();
             let scenes = self.scenes(&read, &file, &interrupt, &mut warnings)?;
             if let Some(d) = &mut drawing {
-                draw(d, &scenes).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+                // All levels side by side, from one camera.
+                scenes.iter().try_for_each(|s| d.add(s))?;
             }
             let report = self.write(&scenes, &output, format, &interrupt, &mut warnings)?;
             drawing.as_mut().map_or(Ok(()), Drawing::write)?;
@@ -213,11 +213,6 @@ impl Args {
         let next = triangles.iter().skip(1).map(|&t| 0.5 * t as f64 / full);
         next.chain([0.0]).collect()
     }
-}
-
-/// All levels side by side, from one camera.
-fn draw(drawing: &mut Drawing, scenes: &[Scene]) -> Result<(), SurfaceError> {
-    scenes.iter().try_for_each(|s| drawing.add(s))
 }
 
 /// The schema of `--json`; docs/json.md says what each field means.

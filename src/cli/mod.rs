@@ -14,6 +14,7 @@ mod convert;
 mod cull;
 mod decode;
 mod encode;
+mod ending;
 mod extract;
 mod fly;
 mod generate;

@@ -2,7 +2,7 @@
 
 use super::{Failure, common};
 use progmesh::io::files;
-use progmesh::report::{Picture, Style, Surface, SurfaceError, View, render};
+use progmesh::report::{Picture, Style, Surface, View, render};
 use progmesh::scene::Scene;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -67,10 +67,10 @@ impl Drawing {
         self.view = Some(view);
     }
 
-    /// Draws a scene, to the right of those before.
-    pub(crate) fn add(&mut self, scene: &Scene) -> Result<(), SurfaceError> {
+    /// Draws a scene, to the right of those before. One that cannot be drawn is an output that failed, whatever command asked for it.
+    pub(crate) fn add(&mut self, scene: &Scene) -> Result<(), Failure> {
         let start = Instant::now();
-        let surface = Surface::of(scene)?;
+        let surface = Surface::of(scene).map_err(|e| self.failed(e))?;
         let (width, height) = PICTURE;
         let first = || View::three_quarter(surface.bounds(), width, height).tightened(&surface);
         let view = self.view.get_or_insert_with(first);
@@ -84,12 +84,15 @@ impl Drawing {
     /// Writes the file, all or nothing.
     pub(crate) fn write(&mut self) -> Result<(), Failure> {
         let start = Instant::now();
-        let failed = |why: String| Failure::Output(format!("{}: {why}", self.path.display()));
         let bytes = Picture::beside(&self.pictures, WHITE).png();
-        let bytes = bytes.ok_or_else(|| failed("the picture could not be encoded".into()))?;
-        files::write_file(&self.path, &bytes).map_err(|e| failed(e.to_string()))?;
+        let bytes = bytes.ok_or_else(|| self.failed("the picture could not be encoded"))?;
+        common::write_bytes(&self.path, &bytes)?;
         self.seconds += start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    fn failed(&self, why: impl std::fmt::Display) -> Failure {
+        Failure::Output(format!("{}: {why}", self.path.display()))
     }
 }
 
@@ -118,6 +121,17 @@ mod tests {
         assert_eq!(caption(1, 1), "1 triangle");
         assert_eq!(caption(121_496, 75_730), "121,496 triangles instanced");
         assert_eq!(caption(2, 3), "2 triangles shown");
+    }
+
+    #[test]
+    fn a_scene_that_cannot_be_drawn_is_an_output_that_failed() {
+        let arguments = PictureArgs { png: Some("shot.png".into()), wireframe: false };
+        let mut drawing = arguments.drawing().unwrap().unwrap();
+        let mut mesh = progmesh::scene::SceneMesh::default();
+        mesh.geometry.corners = vec![0, 1, 2];
+        let failure = drawing.add(&Scene::from_mesh(mesh)).unwrap_err();
+        assert_eq!(failure.code(), 4);
+        assert!(failure.message().is_some_and(|m| m.starts_with("shot.png: mesh 0: ")));
     }
 
     #[test]

@@ -127,7 +127,7 @@ impl Args {
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
             if let Some(d) = &mut drawing {
-                d.add(&scene).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+                d.add(&scene)?;
             }
             let instanced_in = scene.instanced_triangles();
             let result = simplify_scene(scene, &job, &Progress::new(&interrupt, self.quiet, "simplifying"));
@@ -149,7 +149,7 @@ impl Args {
             let write = writing.elapsed().as_secs_f64();
             let written = written.and_then(|()| match &mut drawing {
                 Some(d) => {
-                    d.add(&scene).map_err(|e| Failure::Output(format!("the result: {e}")))?;
+                    d.add(&scene)?;
                     d.write()
                 }
                 None => Ok(()),

@@ -114,6 +114,11 @@ impl Front {
         self.applied[i as usize / 64] >> (i % 64) & 1 != 0
     }
 
+    /// A bit for every split: it is applied.
+    pub(crate) fn applied_bits(&self) -> &[u64] {
+        &self.applied
+    }
+
     /// Nothing applied depends on split `i`, in the hierarchy or beside it.
     #[inline]
     pub(crate) fn is_free(&self, i: u32) -> bool {

@@ -49,12 +49,35 @@ impl View {
         }
     }
 
+    /// [`View::to_input`] with some vertices elsewhere: `places` by vertex, ascending, rounded to the stored precision. Of a mesh at full detail the order is that of the splits
+    /// then, unless `places` is empty. O(n).
+    pub fn to_input_with(&self, places: &[(u32, DVec3)]) -> MeshInput {
+        let mut out = self.input(places.is_empty());
+        let shown = (0..self.hierarchy.mesh().vertices() as u32).filter(|&v| self.front.node(v) != NONE);
+        let mut next = places.iter().peekable();
+        for (k, v) in shown.enumerate() {
+            while next.next_if(|p| p.0 < v).is_some() {}
+            let Some((_, p)) = next.next_if(|p| p.0 == v) else { continue };
+            match &mut out.positions {
+                Positions::F32(all) => all[k] = p.as_vec3().to_array(),
+                Positions::F64(all) => all[k] = p.to_array(),
+            }
+        }
+        out
+    }
+
     /// The mesh as flat arrays: vertices, faces and wedges that are shown, numbered in the order of the progressive mesh. If every split is applied, this is
     /// [`crate::Cursor::to_ordered_input`] at full detail: the input, bit for bit. O(n).
     pub fn to_input(&self) -> MeshInput {
+        self.input(true)
+    }
+
+    /// [`View::to_input`]; `ordered`: full detail is in the input's order.
+    fn input(&self, ordered: bool) -> MeshInput {
         let pm = self.hierarchy.mesh();
         let forest = &self.hierarchy.forest;
-        if pm.order.is_some()
+        if ordered
+            && pm.order.is_some()
             && self.vertex_count() == pm.vertices()
             && let Ok(mut cursor) = pm.cursor()
             && cursor.seek(usize::MAX).is_ok()

@@ -15,6 +15,7 @@ pub(super) struct Report {
     vsplits: Statistics,
     ecols: Statistics,
     us: Statistics,
+    morphing: Statistics,
     dirty_index_bytes: Statistics,
     operations_per_second: Option<f64>,
     measured_over_tau: Option<Statistics>,
@@ -35,6 +36,7 @@ pub(super) struct Frame {
     pub(super) us: f64,
     pub(super) tau: Option<f64>,
     pub(super) complete: bool,
+    pub(super) morphing: usize,
     pub(super) visible_vertices: usize,
     pub(super) dirty_index_bytes: usize,
     pub(super) dirty_wedges: usize,
@@ -101,12 +103,12 @@ impl Report {
         };
         let operations: usize = later.iter().map(|f| f.vsplits + f.ecols).sum();
         let time: f64 = later.iter().map(|f| f.us * 1e-6).sum();
-        let ratios = || {
-            frames.iter().filter(|f| f.complete).filter_map(|f| {
-                let tau = f.tau.filter(|t| *t > 0.0)?;
-                f.measured.map(|m| m.max_pixels / tau)
-            })
+        let ratio = |f: &Frame| {
+            let tau = f.tau.filter(|t| *t > 0.0 && f.complete)?;
+            f.measured.map(|m| m.max_pixels / tau)
         };
+        // While vertices move nothing is promised.
+        let above = frames.iter().filter(|f| f.morphing == 0).filter_map(ratio).filter(|r| *r > 1.0);
         Report {
             command: "fly",
             path,
@@ -117,10 +119,11 @@ impl Report {
             vsplits: of(&|f| f.vsplits as f64),
             ecols: of(&|f| f.ecols as f64),
             us: of(&|f| f.us),
+            morphing: of(&|f| f.morphing as f64),
             dirty_index_bytes: of(&|f| f.dirty_index_bytes as f64),
             operations_per_second: (operations > 0 && time > 0.0).then(|| operations as f64 / time),
-            measured_over_tau: Statistics::of(ratios()),
-            above: ratios().filter(|r| *r > 1.0).count(),
+            measured_over_tau: Statistics::of(frames.iter().filter_map(ratio)),
+            above: above.count(),
             memory,
             seconds: Seconds { read, bounds },
             warnings: vec![],
@@ -146,6 +149,9 @@ impl Report {
         lines.push(s("collapses", &self.ecols));
         lines.push(s("microseconds", &self.us));
         lines.push(s("index bytes to upload", &self.dirty_index_bytes));
+        if self.morphing.max > 0.0 {
+            lines.push(s("vertices on the way", &self.morphing));
+        }
         if let Some(m) = &self.measured_over_tau {
             lines.push(s("measured error / tau", m));
         }

@@ -200,7 +200,7 @@ impl Args {
             let write = writing.elapsed().as_secs_f64();
             if let Some(d) = &mut drawing {
                 let shown = ground::scene(&made.tin, &grid, picture_space(&source, &grid, space), "terrain");
-                d.add(&shown).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+                d.add(&shown)?;
                 d.write()?;
             }
             let draw = drawing.as_ref().map_or(0.0, |d| d.seconds);

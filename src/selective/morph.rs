@@ -1,0 +1,123 @@
+//! How changes of a scene show themselves.
+
+use crate::refine::selective::{Changes, Lens, TimedMorph, View};
+use glam::DVec3;
+
+/// How changes that can be seen show themselves. Those that cannot are made at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Geomorph {
+    /// By error: a split begins to show where its error could take up 1 / `band` of the tolerance, and shows wholly at the tolerance. It depends on the view alone, not on
+    /// earlier frames, and costs the faces of the finer tolerance. `band` is more than 1.
+    Error {
+        /// Tolerances from nothing to all.
+        band: f64,
+    },
+    /// By time: a change takes so many frames, at least 1. What is undone stays for as long.
+    Time {
+        /// How many.
+        frames: u32,
+    },
+}
+
+/// The morphs of a scene's meshes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Morphs {
+    pub(super) geomorph: Option<Geomorph>,
+    /// By time: one a mesh, from the first frame on.
+    timed: Vec<TimedMorph>,
+    /// Vertices of each mesh that are not in their own place, ascending, and where they are; empty if all are.
+    displaced: Vec<Vec<(u32, DVec3)>>,
+    morphing: usize,
+}
+
+impl Morphs {
+    pub(super) fn new(geomorph: Option<Geomorph>) -> Morphs {
+        Morphs { geomorph, ..Default::default() }
+    }
+
+    /// What tolerances are divided by.
+    pub(super) fn band(&self) -> f64 {
+        match self.geomorph {
+            Some(Geomorph::Error { band }) => band.max(1.0),
+            _ => 1.0,
+        }
+    }
+
+    /// Vertices on the way.
+    pub(super) fn morphing(&self) -> usize {
+        self.morphing
+    }
+
+    /// The mesh that is drawn of mesh `m`.
+    pub(super) fn view<'a>(&'a self, views: &'a [View], m: usize) -> &'a View {
+        self.timed.get(m).map_or(&views[m], TimedMorph::view)
+    }
+
+    /// Views besides those of the scene.
+    pub(super) fn own_views(&self) -> impl Iterator<Item = &View> {
+        self.timed.iter().map(TimedMorph::view)
+    }
+
+    /// The vertices of mesh `m` that are not in their own place.
+    pub(super) fn displaced(&self, m: usize) -> &[(u32, DVec3)] {
+        self.displaced.get(m).map_or(&[], Vec::as_slice)
+    }
+
+    pub(super) fn take_changes(&mut self, views: &mut [View]) -> Vec<Changes> {
+        // The leaders' are not drawn.
+        let own: Vec<Changes> = views.iter_mut().map(View::take_changes).collect();
+        if self.timed.is_empty() {
+            own
+        } else {
+            self.timed.iter_mut().map(TimedMorph::take_changes).collect()
+        }
+    }
+
+    /// A frame further. Returns splits and collapses of what is drawn, if that is not what `views` did.
+    pub(super) fn follow(&mut self, views: &[View], lenses: &[Vec<Lens>]) -> Option<[usize; 2]> {
+        let pairs = || views.iter().zip(lenses);
+        match self.geomorph {
+            None => None,
+            Some(Geomorph::Error { band }) => {
+                self.displaced = pairs().map(|(v, l)| displaced_by_error(v, l, band)).collect();
+                self.morphing = self.displaced.iter().map(Vec::len).sum();
+                None
+            }
+            // The first frame shows what it asks for.
+            Some(Geomorph::Time { frames }) if self.timed.is_empty() => {
+                self.timed = views.iter().map(|v| TimedMorph::new(v, frames)).collect();
+                None
+            }
+            Some(Geomorph::Time { .. }) => {
+                let mut sum = [0; 2];
+                self.morphing = 0;
+                for (t, (v, l)) in self.timed.iter_mut().zip(pairs()) {
+                    let done = t.follow(v, l);
+                    sum = [sum[0] + done.splits, sum[1] + done.collapses];
+                    self.morphing += done.morphing;
+                }
+                self.displaced = self.timed.iter().map(|t| t.displaced().collect()).collect();
+                Some(sum)
+            }
+        }
+    }
+}
+
+fn displaced_by_error(view: &View, lenses: &[Lens], band: f64) -> Vec<(u32, DVec3)> {
+    let all = 0..view.hierarchy().mesh().vertices() as u32;
+    all.filter_map(|v| {
+        let own = view.position(v)?;
+        let at = view.morphed_by_all(lenses, v, band)?;
+        (at != own).then_some((v, at))
+    })
+    .collect()
+}
+
+/// Where vertex `v` is drawn.
+pub(super) fn place(view: &View, displaced: &[(u32, DVec3)], v: u32) -> Option<DVec3> {
+    match displaced.binary_search_by_key(&v, |d| d.0) {
+        Ok(k) => displaced.get(k).map(|d| d.1),
+        Err(_) => view.position(v),
+    }
+}
