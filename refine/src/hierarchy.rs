@@ -20,7 +20,7 @@ mod spheres;
 pub use bounds::{Bounds, Guarantee, SplitBounds};
 pub(crate) use bounds::{Packed, unpack};
 pub(crate) use cone::Cone;
-pub(crate) use forest::Forest;
+pub(crate) use forest::{Forest, SplitRows};
 
 use crate::progressive::{Damage, ProgressiveMesh};
 use crate::selective::Front;

@@ -26,6 +26,7 @@
 pub mod format;
 pub mod geomorph;
 pub mod hierarchy;
+pub mod paged;
 pub mod progressive;
 mod record;
 pub mod selective;

@@ -25,6 +25,7 @@ pub use adapt::{Done, Limits};
 pub use changes::Changes;
 pub(crate) use front::Front;
 pub use lens::{Cull, Lens, LensError};
+pub(crate) use list::Entry;
 pub use regulator::Regulator;
 pub use timed::{Followed, TimedMorph};
 

@@ -11,21 +11,21 @@ pub(super) fn raw_bytes(splits: usize) -> u64 {
 }
 
 /// The parts of a split's bounds: error, radius, axis, angle.
-type Parts = [u32; 5];
+pub(super) type Parts = [u32; 5];
 
-fn parts(b: Packed) -> Parts {
+pub(super) fn parts(b: Packed) -> Parts {
     let c = b.cone.0;
     [b.error as u32, b.radius as u32, c & 0x3ff, c >> 10 & 0x3ff, c >> 20]
 }
 
-fn packed([error, radius, x, y, angle]: Parts) -> Packed {
+pub(super) fn packed([error, radius, x, y, angle]: Parts) -> Packed {
     Packed { error: error as u16, radius: radius as u16, cone: Cone(x | y << 10 | angle << 20) }
 }
 
 /// Bits of each part.
 const BITS: [u32; 5] = [16, 16, 10, 10, 12];
 
-fn code<C: Coder>(c: &mut C, models: &mut [Number; 5], last: &mut Parts, value: Parts) {
+pub(super) fn code<C: Coder>(c: &mut C, models: &mut [Number; 5], last: &mut Parts, value: Parts) {
     for k in 0..5 {
         // Differences wrap around, so that whatever is read is in range.
         let shift = 32 - BITS[k];

@@ -31,6 +31,8 @@ impl ChunkType {
     pub const SEQUEL: ChunkType = ChunkType(*b"SPLS");
     /// The input's numbering of a mesh.
     pub const ORDER: ChunkType = ChunkType(*b"ORDR");
+    /// Links and bounds of the chunk before it, for refining out of core ([`crate::paged`]).
+    pub const PAGE: ChunkType = ChunkType(*b"PAGE");
     /// What the mesh stands in; opaque here.
     pub const SCENE: ChunkType = ChunkType(*b"SCNE");
     /// Bounds of splits for view-dependent refinement.
@@ -62,7 +64,7 @@ pub struct Chunk {
     pub first: u32,
     /// Splits in it; vertices of the base.
     pub count: u32,
-    /// The first face its splits make.
+    /// The first face its splits make; of a `PAGE` the first wedge.
     pub first_face: u32,
     /// The band: all splits of a band have errors within a factor of 4, or belong to one level of the method.
     pub band: u32,
@@ -143,12 +145,12 @@ impl From<std::io::Error> for FormatError {
 }
 
 impl Chunk {
-    pub(super) fn damage(&self, what: &'static str) -> FormatError {
+    pub(crate) fn damage(&self, what: &'static str) -> FormatError {
         FormatError::Chunk { index: self.index, kind: self.kind, mesh: self.mesh, what }
     }
 
     /// Compares the checksum.
-    pub(super) fn check(&self, bytes: &[u8]) -> Result<(), FormatError> {
+    pub(crate) fn check(&self, bytes: &[u8]) -> Result<(), FormatError> {
         if (bytes.len() as u64) < self.stored {
             return Err(self.damage("the file ends within it"));
         }

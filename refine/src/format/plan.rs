@@ -64,7 +64,7 @@ impl Forest {
 
 impl Plan {
     /// A chunk's roots come by number if chunks are read alone, else along the curve. `None` if the splits refer to what does not exist.
-    pub(super) fn new(pm: &ProgressiveMesh, alone: bool) -> Option<Plan> {
+    pub(super) fn new(pm: &ProgressiveMesh, alone: bool, chunk: usize) -> Option<Plan> {
         let n = pm.splits.len();
         let n0 = pm.base_vertices();
         if pm.splits.vertex.iter().zip(n0..).any(|(&v, count)| v as usize >= count) {
@@ -100,7 +100,7 @@ impl Plan {
         for band in keys.chunk_by(|a, b| a.0 >> 32 == b.0 >> 32) {
             let name = (band[0].0 >> 32) as u32;
             let segment = (name.saturating_sub(1) % segments) as usize;
-            let aim = band.len().div_ceil(band.len().div_ceil(CHUNK));
+            let aim = band.len().div_ceil(band.len().div_ceil(chunk.max(1)));
             let (mut rest, mut subtree) = (band, 0);
             while !rest.is_empty() || (segments == 1 && !waiting[0].is_empty()) {
                 let mut end = aim.min(rest.len());

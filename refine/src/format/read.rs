@@ -31,7 +31,7 @@ pub enum Piece {
 }
 
 /// Reads one chunk, whose bytes are given. `head` is that of its mesh; only chunks of splits need it.
-fn read_piece(chunk: &Chunk, head: Option<&MeshHead>, bytes: &[u8]) -> Result<Piece, FormatError> {
+pub(crate) fn read_piece(chunk: &Chunk, head: Option<&MeshHead>, bytes: &[u8]) -> Result<Piece, FormatError> {
     chunk.check(bytes)?;
     let damaged = || chunk.damage("its contents contradict each other");
     match chunk.kind {
@@ -259,6 +259,11 @@ impl<S: ByteRanges> RangeReader<S> {
     pub fn read(&self, index: u32, head: Option<&MeshHead>) -> Result<Piece, FormatError> {
         let chunk = self.directory.chunks.get(index as usize).ok_or(FormatError::Head("no such chunk"))?;
         read_piece(chunk, head, &self.source.fetch(chunk.range())?)
+    }
+
+    /// Where the bytes come from.
+    pub fn source(&self) -> &S {
+        &self.source
     }
 
     /// The base of mesh `m`.

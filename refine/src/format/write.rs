@@ -5,10 +5,11 @@ use super::bounds;
 use super::container::{Chunk, ChunkType, Directory, EXPANSION};
 use super::input_order;
 use super::lattice;
-use super::plan::{Piece, Plan};
+use super::pages;
+use super::plan::{self, Piece, Plan};
 use super::sequel::{self, Sequel};
 use super::splits::{self, Counts, Fans};
-use crate::hierarchy::Bounds;
+use crate::hierarchy::{Bounds, Forest};
 use crate::progressive::{Damage, ProgressiveMesh, RowsOf};
 use std::sync::Arc;
 
@@ -22,6 +23,11 @@ pub struct EncodeOptions {
     pub quantize: Option<u32>,
     /// Every chunk can be read alone, whatever else was read. Files are larger: by some 22 bits a split for connectivity, and 13 to 18 for places.
     pub alone: bool,
+    /// Beside every chunk, what refining out of core takes ([`crate::paged`]): links of the vertex hierarchy. Only with [`EncodeOptions::alone`], of meshes with bounds
+    /// ([`ProgressiveMesh::bounds`]).
+    pub pages: bool,
+    /// Splits of a chunk, aimed at; 8192 if not said. Smaller ones make larger files, of which views fetch less.
+    pub chunk: Option<u32>,
 }
 
 impl EncodeOptions {
@@ -34,6 +40,19 @@ impl EncodeOptions {
     /// Sets [`EncodeOptions::alone`].
     pub fn with_alone(mut self, on: bool) -> Self {
         self.alone = on;
+        self
+    }
+
+    /// Sets [`EncodeOptions::pages`], and with it [`EncodeOptions::alone`].
+    pub fn with_pages(mut self, on: bool) -> Self {
+        self.pages = on;
+        self.alone |= on;
+        self
+    }
+
+    /// Sets [`EncodeOptions::chunk`].
+    pub fn with_chunk(mut self, splits: Option<u32>) -> Self {
+        self.chunk = splits;
         self
     }
 
@@ -59,6 +78,9 @@ pub enum EncodeError {
     /// A mesh's parts do not go together in a way that [`Damage`] has no word for.
     #[error("mesh {0}: its arrays contradict each other")]
     Inconsistent(usize),
+    /// Pages are wanted of a mesh without bounds.
+    #[error("mesh {0}: it has no bounds, which refining out of core takes; measure them first")]
+    NoBounds(usize),
     /// Quantisation by other than 2 to 30 bits.
     #[error("quantising to {0} bits: 2 to 30 are possible")]
     Bits(u32),
@@ -118,10 +140,14 @@ pub fn encode(
         if pm.bounds.as_ref().is_some_and(|b| b.len() != pm.splits.len()) {
             return Err(EncodeError::Inconsistent(m));
         }
+        if options.pages && options.alone && pm.bounds.is_none() {
+            return Err(EncodeError::NoBounds(m));
+        }
         let places: Vec<u32> =
             turns.iter().zip(0u32..).filter(|(t, _)| **t as usize == m).map(|(_, k)| k).collect();
         let parts = encode_mesh(m as u32, pm, &places, options).ok_or(EncodeError::Inconsistent(m))?;
         bases.push(parts.base);
+        bases.extend(parts.page);
         chunks.push(parts.splits);
         orders.extend(parts.order);
     }
@@ -155,6 +181,8 @@ fn interleave(meshes: Vec<Vec<Part>>) -> Vec<Part> {
 
 struct MeshParts {
     base: Part,
+    /// What stands behind it.
+    page: Option<Part>,
     splits: Vec<Part>,
     order: Option<Part>,
 }
@@ -174,7 +202,7 @@ fn encode_mesh(
         (quantisation_error, flat_faces) = (error, lattice::flat_faces(pm)?);
     }
     let source = quantised.as_ref().unwrap_or(source);
-    let plan = Plan::new(source, options.alone)?;
+    let plan = Plan::new(source, options.alone, options.chunk.map_or(plan::CHUNK, |c| c as usize))?;
     let mut pm = source.reordered(&plan.order).ok()?;
     let tips = input_order::tips(&pm);
     input_order::turn(&mut pm, &tips, true);
@@ -246,16 +274,41 @@ fn encode_mesh(
         }
         _ => None,
     };
-    let mut all = Vec::with_capacity(2 * plan.pieces.len());
-    for p in splits? {
+    let paged = bounds.as_ref().filter(|_| options.pages && options.alone);
+    let paged = paged.map(|b| (b, Forest::new(&pm)));
+    let page = match &paged {
+        Some((bounds, forest)) => {
+            let (bytes, raw) = pages::write_base(&head, forest, bounds)?;
+            let mut page = part(ChunkType::PAGE, false, m, raw, bytes);
+            (page.chunk.count, page.chunk.first_face) = (head.base_vertices, head.base_wedges);
+            Some(page)
+        }
+        None => None,
+    };
+    let mut all = Vec::with_capacity(3 * plan.pieces.len());
+    for (p, at) in splits?.into_iter().zip(&starts) {
         let beside = match &bounds {
             Some(bounds) => Some(bounds_of(&p, bounds)?),
             None => None,
         };
+        let page = match &paged {
+            Some((bounds, forest)) => {
+                let Chunk { first, count, band, subtree, error, .. } = p.chunk;
+                let vertices = &pm.splits.vertex[at.split..at.split + count as usize];
+                let (bytes, raw) = pages::write(&head, first, vertices, forest, bounds)?;
+                let mut page = part(ChunkType::PAGE, false, m, raw, bytes);
+                page.chunk = Chunk { first, count, band, subtree, error, ..page.chunk };
+                page.chunk.first_face = at.wedge as u32;
+                page.turn = p.turn;
+                Some(page)
+            }
+            None => None,
+        };
         all.push(p);
         all.extend(beside);
+        all.extend(page);
     }
-    Some(MeshParts { base, splits: all, order })
+    Some(MeshParts { base, page, splits: all, order })
 }
 
 /// The bounds of a chunk of splits, to stand behind it.

@@ -67,11 +67,22 @@ impl Lens {
         tau: f64,
         cull: Cull,
     ) -> Result<Lens, LensError> {
+        Self::about(hierarchy.bounds.origin, camera, placed, tau, cull)
+    }
+
+    /// The same for bounds about `origin`.
+    pub(crate) fn about(
+        origin: DVec3,
+        camera: &Camera,
+        placed: &DMat4,
+        tau: f64,
+        cull: Cull,
+    ) -> Result<Lens, LensError> {
         if tau.is_nan() || tau < 0.0 {
             return Err(LensError::Tolerance(tau));
         }
         // About the origin of the bounds, so that nothing is lost far out.
-        let placed = *placed * DMat4::from_translation(hierarchy.bounds.origin);
+        let placed = *placed * DMat4::from_translation(origin);
         let frustum = camera.frustum().in_space_of(&placed).ok_or(LensError::Placement)?;
         let linear = DMat3::from_mat4(placed);
         let (least, most) = stretch(&linear);
@@ -141,7 +152,7 @@ impl Lens {
 
     /// [`Lens::needs`] at another tolerance.
     #[inline]
-    pub(super) fn wants(&self, e: &Entry, tau: f64) -> bool {
+    pub(crate) fn wants(&self, e: &Entry, tau: f64) -> bool {
         let (centre, radius) = (e.centre.as_dvec3(), e.radius as f64);
         let size = self.lambda * e.error as f64;
         // Depth beyond which it is fine enough; 0 / 0 is not.
@@ -156,7 +167,7 @@ impl Lens {
 
     /// How many tolerances the error may take up, at most; 0 if it is not seen.
     #[inline]
-    pub(super) fn urgency(&self, e: &Entry) -> f64 {
+    pub(crate) fn urgency(&self, e: &Entry) -> f64 {
         let (centre, radius) = (e.centre.as_dvec3(), e.radius as f64);
         if !self.sees(e, centre, radius) {
             return 0.0;

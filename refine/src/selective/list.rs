@@ -1,16 +1,16 @@
 //! Splits that may come next, with what is needed to decide about each in one run of memory.
 
 use crate::aif::NONE;
-use crate::hierarchy::{Hierarchy, unpack};
+use crate::hierarchy::{Hierarchy, Packed, unpack};
 use glam::Vec3;
 
 /// A split and its bounds, ready to be decided about, 44 B.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Entry {
+pub(crate) struct Entry {
     pub(super) centre: Vec3,
     pub(super) radius: f32,
     pub(super) error: f32,
-    pub(super) split: u32,
+    pub(crate) split: u32,
     /// The normal cone's axis, and cosine and sine of its half angle. Stored cones are wider by 3e-4 rad, so that rounding to f32 does not show.
     pub(super) axis: Vec3,
     pub(super) cos: f32,
@@ -19,17 +19,14 @@ pub(super) struct Entry {
 
 impl Entry {
     pub(super) fn of(h: &Hierarchy, i: u32) -> Entry {
-        let b = h.bounds.of[i as usize];
+        Entry::new(i, h.local_centre(i), h.bounds.of[i as usize])
+    }
+
+    /// Of a split at `centre`, about the origin of the bounds.
+    #[inline]
+    pub(crate) fn new(split: u32, centre: Vec3, b: Packed) -> Entry {
         let (axis, cos, sin) = b.cone.unpack_parts();
-        Entry {
-            centre: h.local_centre(i),
-            radius: unpack(b.radius),
-            error: unpack(b.error),
-            split: i,
-            axis,
-            cos,
-            sin,
-        }
+        Entry { centre, radius: unpack(b.radius), error: unpack(b.error), split, axis, cos, sin }
     }
 }
 

@@ -1,0 +1,267 @@
+//! `PAGE` chunks: what refining out of core takes beside a chunk of splits and its bounds: links of the vertex hierarchy.
+//!
+//! What a chunk's splits lead to in later chunks stands there with its bounds: so whether a split is needed is decided before its chunk is there.
+
+use super::base::MeshHead;
+use super::bounds::{self, Parts};
+use super::coder::{Bit, Coder, Decoder, Encoder, Number};
+use crate::aif::NONE;
+use crate::hierarchy::{Bounds, Forest, Packed};
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+/// What the splits of a chunk replace, and what replaces them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Links {
+    /// The node that each split replaces.
+    pub(crate) parent: Vec<u32>,
+    /// The split that replaces each of both nodes that a split makes; [`NONE`] for a leaf.
+    pub(crate) next: Vec<[u32; 2]>,
+    /// Splits of later chunks that replace nodes made here, ascending, and their bounds.
+    pub(crate) outside: Vec<(u32, Packed)>,
+}
+
+/// The same of the vertices of a base.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct BaseLinks {
+    /// The middle of the box about the finest mesh's vertices: bounds are about it.
+    pub(crate) origin: DVec3,
+    /// The length of the box's diagonal.
+    pub(crate) diagonal: f64,
+    /// The split that replaces each vertex; [`NONE`] for none.
+    pub(crate) next: Vec<u32>,
+    /// Its bounds.
+    pub(crate) bounds: Vec<Packed>,
+}
+
+/// Bytes in memory: of a split, of a split of a later chunk, of a base, and of one of its vertices.
+pub(crate) const SPLIT: u64 = 12;
+pub(crate) const OUTSIDE: u64 = 12;
+const BASE: u64 = 32;
+const VERTEX: u64 = 12;
+
+/// Models of one chunk.
+#[derive(Default)]
+struct Codec {
+    parent: Number,
+    continues: [Bit; 2],
+    next: [Number; 2],
+    bounds: [Number; 5],
+}
+
+impl Codec {
+    /// Whether a split of a later chunk replaces a node, and which; `last` is the last one of this side.
+    fn next<C: Coder>(
+        &mut self,
+        c: &mut C,
+        side: usize,
+        last: &mut u32,
+        beyond: std::ops::Range<u32>,
+        value: u32,
+    ) -> Option<Option<u32>> {
+        if !c.bit(&mut self.continues[side], value != NONE) {
+            return Some(None);
+        }
+        let step = c.signed(&mut self.next[side], value as i64 - *last as i64);
+        *last = u32::try_from((*last as i64).checked_add(step)?).ok().filter(|i| beyond.contains(i))?;
+        Some(Some(*last))
+    }
+
+    /// Bounds, near those given, which they become.
+    fn bounds<C: Coder>(&mut self, c: &mut C, near: &mut Parts, value: Packed) -> Packed {
+        bounds::code(c, &mut self.bounds, near, bounds::parts(value));
+        bounds::packed(*near)
+    }
+}
+
+/// Where links come from when they are written.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    forest: &'a Forest,
+    bounds: &'a Bounds,
+}
+
+impl Source<'_> {
+    /// The split that replaces a node, if that is a later one.
+    fn next(&self, node: u32) -> u32 {
+        self.forest.split_of[node as usize]
+    }
+}
+
+/// The bounds of a split when they are written; anything when they are read.
+fn bounds_in(source: Option<Source<'_>>, i: u32) -> Packed {
+    source.and_then(|s| s.bounds.of.get(i as usize).copied()).unwrap_or_default()
+}
+
+/// Codes the links of the splits from `first` on, of the vertices and with the bounds given.
+fn code<C: Coder>(
+    c: &mut C,
+    head: &MeshHead,
+    first: u32,
+    vertices: &[u32],
+    own: &[Packed],
+    source: Option<Source<'_>>,
+) -> Option<Links> {
+    let (n0, count) = (head.base_vertices, vertices.len());
+    let end = first.checked_add(u32::try_from(count).ok()?)?;
+    // Every node has a number.
+    end.checked_mul(2)?.checked_add(n0)?;
+    let mut codec = Codec::default();
+    let mut links = Links {
+        parent: Vec::with_capacity(count),
+        next: vec![[NONE; 2]; count],
+        ..Links::default()
+    };
+    // The node that each vertex is at, once a split of the chunk has split it; and of vertices made here.
+    let mut roots: FxHashMap<u32, u32> = FxHashMap::default();
+    let mut made: Vec<u32> = Vec::with_capacity(count);
+    for (i, &v) in (first..end).zip(vertices) {
+        let here = v.checked_sub(n0).and_then(|j| j.checked_sub(first)).map(|k| k as usize);
+        let known = match here {
+            Some(k) => Some(*made.get(k)?),
+            None => roots.get(&v).copied(),
+        };
+        let parent = match known {
+            Some(node) => node,
+            None => {
+                let maker = v.checked_sub(n0);
+                let start = maker.map_or(v, |j| n0 + 2 * j + 1);
+                let back = source.map_or(0, |s| match s.forest.parent[i as usize] {
+                    p if p == start => 0,
+                    p => first - s.forest.maker(p),
+                });
+                match u32::try_from(c.number(&mut codec.parent, back as u64)).ok()? {
+                    0 => start,
+                    back => {
+                        let j = first.checked_sub(back).filter(|&j| maker.is_none_or(|m| j > m))?;
+                        n0 + 2 * j
+                    }
+                }
+            }
+        };
+        if let Some(k) = parent.checked_sub(n0).and_then(|k| k.checked_sub(2 * first)) {
+            let (k, side) = (k as usize / 2, k as usize % 2);
+            links.next.get_mut(k)?[side] = i;
+        }
+        links.parent.push(parent);
+        match here {
+            Some(k) => made[k] = n0 + 2 * i,
+            None => {
+                roots.insert(v, n0 + 2 * i);
+            }
+        }
+        made.push(n0 + 2 * i + 1);
+    }
+    let mut last = [end; 2];
+    for (k, &own) in own.iter().enumerate().take(count) {
+        for (side, last) in last.iter_mut().enumerate() {
+            if links.next[k][side] != NONE {
+                continue;
+            }
+            let node = n0 + 2 * (first + k as u32) + side as u32;
+            let value = source.map_or(NONE, |s| s.next(node));
+            if let Some(i) = codec.next(c, side, last, end..head.splits, value)? {
+                links.next[k][side] = i;
+                let bounds = codec.bounds(c, &mut bounds::parts(own), bounds_in(source, i));
+                links.outside.push((i, bounds));
+            }
+        }
+        if c.spent() {
+            return None;
+        }
+    }
+    links.outside.sort_unstable_by_key(|o| o.0);
+    // No split replaces two nodes.
+    links.outside.windows(2).all(|w| w[0].0 < w[1].0).then_some(links)
+}
+
+fn code_base<C: Coder>(
+    c: &mut C,
+    head: &MeshHead,
+    links: &mut BaseLinks,
+    source: Option<Source<'_>>,
+) -> Option<()> {
+    let mut codec = Codec::default();
+    let (mut last, mut near) = (0, Parts::default());
+    for v in 0..head.base_vertices {
+        let value = source.map_or(NONE, |s| s.next(v));
+        let next = codec.next(c, 0, &mut last, 0..head.splits, value)?;
+        links.next.push(next.unwrap_or(NONE));
+        links.bounds.push(match next {
+            Some(i) => codec.bounds(c, &mut near, bounds_in(source, i)),
+            None => Packed::default(),
+        });
+        if c.spent() {
+            return None;
+        }
+    }
+    Some(())
+}
+
+/// The `PAGE` of the splits from `first` on, of the vertices given, and what it takes in memory. `None` if the arrays contradict each other.
+pub(super) fn write(
+    head: &MeshHead,
+    first: u32,
+    vertices: &[u32],
+    forest: &Forest,
+    bounds: &Bounds,
+) -> Option<(Vec<u8>, u64)> {
+    let own = bounds.of.get(first as usize..first as usize + vertices.len())?;
+    let mut e = Encoder::default();
+    let links = code(&mut e, head, first, vertices, own, Some(Source { forest, bounds }))?;
+    let mut out = Vec::new();
+    e.finish(&mut out);
+    Some((out, raw_bytes(&links)))
+}
+
+fn raw_bytes(links: &Links) -> u64 {
+    SPLIT * links.parent.len() as u64 + OUTSIDE * links.outside.len() as u64
+}
+
+/// Reads the `PAGE` of splits whose vertices and bounds are given. `None`: damage.
+pub(crate) fn read(
+    head: &MeshHead,
+    first: u32,
+    (vertices, own): (&[u32], &[Packed]),
+    raw: u64,
+    bytes: &[u8],
+) -> Option<Links> {
+    if own.len() != vertices.len() {
+        return None;
+    }
+    let links = code(&mut Decoder::new(bytes)?, head, first, vertices, own, None)?;
+    (raw_bytes(&links) == raw).then_some(links)
+}
+
+/// The `PAGE` of a base.
+pub(super) fn write_base(head: &MeshHead, forest: &Forest, bounds: &Bounds) -> Option<(Vec<u8>, u64)> {
+    let mut out = Vec::new();
+    let (origin, diagonal) = bounds.extent();
+    for x in origin.to_array().into_iter().chain([diagonal]) {
+        out.extend_from_slice(&x.to_le_bytes());
+    }
+    let mut e = Encoder::default();
+    code_base(&mut e, head, &mut BaseLinks::default(), Some(Source { forest, bounds }))?;
+    e.finish(&mut out);
+    Some((out, raw_bytes_of_base(head)))
+}
+
+fn raw_bytes_of_base(head: &MeshHead) -> u64 {
+    BASE + VERTEX * head.base_vertices as u64
+}
+
+/// Reads the `PAGE` of a base. `None`: damage.
+pub(crate) fn read_base(head: &MeshHead, raw: u64, bytes: &[u8]) -> Option<BaseLinks> {
+    let (numbers, stream) = bytes.split_at_checked(BASE as usize)?;
+    let mut x = [0.0; 4];
+    for (x, b) in x.iter_mut().zip(numbers.chunks_exact(8)) {
+        *x = f64::from_le_bytes(b.try_into().ok()?);
+    }
+    if raw != raw_bytes_of_base(head) || x.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let mut links =
+        BaseLinks { origin: DVec3::new(x[0], x[1], x[2]), diagonal: x[3], ..BaseLinks::default() };
+    code_base(&mut Decoder::new(stream)?, head, &mut links, None)?;
+    Some(links)
+}

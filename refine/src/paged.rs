@@ -1,0 +1,324 @@
+//! View-dependent refinement out of core: of a `.pm` of any size only the chunks that a view needs are read, and no more memory is held than a limit.
+//!
+//! A [`PagedView`] is to a mesh of a file what a [`crate::selective::View`] is to one in memory. The file's chunks must be ones that are read alone, each with a `PAGE`
+//! beside it ([`crate::format::EncodeOptions::pages`]). Resident are the base, the file's directory, and the *pages* (chunks of splits, decoded) that hold applied splits; others stay
+//! as long as there is room, the least recently used go first.
+//!
+//! A page says of every vertex it makes which split replaces it, and gives that split's bounds. So a view knows whether it needs a split before it has the split's chunk: a chunk
+//! is fetched when a split in it is needed, or when one that is needed depends on a split in it. Beginning takes time and memory in proportion to the base and the directory, not
+//! to the splits.
+//!
+//! Guaranteed: at rest, with room and fetches enough, the mesh is that of a [`crate::selective::View`] with the same bounds, the least closed set; at every time the set is closed, so there are
+//! no cracks. [`PagedView::bytes`] never exceeds the limit: where that is too small, or fetches are limited, the mesh is coarser than asked, and
+//! [`PagedDone`] says so. Damage found on the way is an error that leaves the mesh as it was.
+//!
+//! Not guaranteed: what order the input had (`ORDR` is not read): vertices and faces come in the order of the file. Edges without faces come with the base.
+
+mod adapt;
+mod front;
+mod output;
+mod page;
+mod shelf;
+
+pub use adapt::{PagedDone, PagedLimits};
+pub use shelf::Traffic;
+
+use crate::aif::NONE;
+use crate::format::{ByteRanges, FormatError, RangeReader};
+use crate::progressive::{Damage, Fans};
+use crate::selective::{Cull, Entry, Lens, LensError};
+use crate::view::Camera;
+use glam::{DMat4, DVec3};
+use shelf::Shelf;
+use std::sync::Arc;
+
+/// A view that pages its mesh in has failed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PagedError {
+    /// The file is damaged, or could not be read.
+    #[error("{0}")]
+    Format(#[from] FormatError),
+    /// Splits contradict each other.
+    #[error("{0}")]
+    Damage(#[from] Damage),
+    /// The chunks cannot be read alone, or have no links beside them.
+    #[error(
+        "it was not written for refining out of core: write it with random access (`encode --random-access`)"
+    )]
+    NoPages,
+    /// Not even the coarsest mesh fits into the limit.
+    #[error("the limit of {limit} bytes is too small: {needed} are needed for the base, the directory and one chunk")]
+    Memory {
+        /// Bytes.
+        limit: usize,
+        /// Bytes.
+        needed: usize,
+    },
+}
+
+/// A split that may come next, or may be undone next.
+#[derive(Clone, Copy, Debug)]
+struct Open {
+    entry: Entry,
+    /// The node it replaces.
+    node: u32,
+}
+
+/// A mesh of a file between base and full detail, finer where a view needs it, whose parts are read when they are needed.
+///
+/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 90 B for a split of a resident page and 200 B for a vertex shown.
+#[derive(Debug)]
+pub struct PagedView<S> {
+    shelf: Shelf<S>,
+    fans: Fans,
+    /// The face in every slot; [`NONE`] for none.
+    face_in: Vec<u32>,
+    free: Vec<u32>,
+    /// Slots whose corners changed, a bit each.
+    touched: Vec<u64>,
+    touched_wedges: usize,
+    vertices: usize,
+    faces: usize,
+    applied: usize,
+    /// Splits that could be applied next: what replaces nodes in the mesh. Their pages may not be there.
+    open: Vec<Open>,
+    /// Splits that could be undone next.
+    last: Vec<Open>,
+    /// Needed splits, the most urgent on top; empty between frames.
+    queue: std::collections::BinaryHeap<(u16, std::cmp::Reverse<u32>)>,
+    closure: Vec<u32>,
+    resume: [usize; 2],
+    limit: usize,
+}
+
+impl<S: ByteRanges> PagedView<S> {
+    /// A view that shows the base of mesh `m`, and holds at most `limit` bytes. Reads the base and what stands beside it.
+    ///
+    /// Errors: a file without pages, damage, the source's; a limit that the base does not fit into.
+    pub fn new(reader: Arc<RangeReader<S>>, m: u32, limit: usize) -> Result<Self, PagedError> {
+        let (shelf, fans) = Shelf::new(reader, m)?;
+        let (vertices, faces) = (shelf.base.vertices(), fans.corners.len());
+        let mut view = PagedView {
+            shelf,
+            face_in: (0..faces as u32).collect(),
+            free: Vec::new(),
+            touched: vec![0; faces.div_ceil(64)],
+            touched_wedges: 0,
+            fans,
+            vertices,
+            faces,
+            applied: 0,
+            open: Vec::new(),
+            last: Vec::new(),
+            queue: Default::default(),
+            closure: Vec::new(),
+            resume: [0; 2],
+            limit,
+        };
+        view.open.reserve_exact(vertices);
+        let needed = view.bytes() + view.shelf.most_at_once();
+        if needed > limit {
+            return Err(PagedError::Memory { limit, needed });
+        }
+        for v in 0..vertices as u32 {
+            view.offer(v)?;
+        }
+        Ok(view)
+    }
+
+    /// Faces shown.
+    pub fn face_count(&self) -> usize {
+        self.faces
+    }
+
+    /// Vertices shown.
+    pub fn vertex_count(&self) -> usize {
+        self.vertices
+    }
+
+    /// Splits applied.
+    pub fn applied(&self) -> usize {
+        self.applied
+    }
+
+    /// Splits at full detail.
+    pub fn splits(&self) -> usize {
+        self.shelf.head.splits as usize
+    }
+
+    /// Vertices at full detail.
+    pub fn full_vertices(&self) -> usize {
+        self.shelf.head.base_vertices as usize + self.splits()
+    }
+
+    /// Faces at full detail.
+    pub fn full_faces(&self) -> usize {
+        self.shelf.head.first_face(self.shelf.head.splits) as usize
+    }
+
+    /// True if split `i` is applied.
+    pub fn is_applied(&self, i: u32) -> bool {
+        self.shelf.is_applied(i)
+    }
+
+    /// What was read so far.
+    pub fn traffic(&self) -> Traffic {
+        self.shelf.traffic
+    }
+
+    /// The middle of the box about the finest mesh's vertices, and the length of its diagonal.
+    pub fn extent(&self) -> (DVec3, f64) {
+        (self.shelf.base.links.origin, self.shelf.base.links.diagonal)
+    }
+
+    /// A lens for this mesh; see [`Lens::new`].
+    ///
+    /// Errors: as there.
+    pub fn lens(&self, camera: &Camera, placed: &DMat4, tau: f64, cull: Cull) -> Result<Lens, LensError> {
+        Lens::about(self.shelf.base.links.origin, camera, placed, tau, cull)
+    }
+
+    /// The limit, bytes.
+    pub fn limit(&self) -> usize {
+        self.limit
+    }
+
+    /// Sets the limit. What is held beyond it goes as soon as it is not shown any more.
+    pub fn set_limit(&mut self, bytes: usize) {
+        self.limit = bytes;
+    }
+
+    /// Bytes held: the sum of the capacities of all arrays. While a chunk is decoded, a part of the limit that is set aside for that is used as well.
+    pub fn bytes(&self) -> usize {
+        self.shelf.bytes()
+            + 28 * self.fans.corners.capacity()
+            + 4 * self.free.capacity()
+            + 8 * self.touched.capacity()
+            + size_of::<Open>() * (self.open.capacity() + self.last.capacity())
+            + 8 * self.queue.capacity()
+            + 4 * self.closure.capacity()
+            + size_of::<Self>()
+    }
+
+    /// Bytes that grow with the mesh shown, of [`PagedView::bytes`].
+    pub fn shown_bytes(&self) -> usize {
+        28 * self.fans.corners.capacity()
+            + 4 * self.free.capacity()
+            + 8 * self.touched.capacity()
+            + size_of::<Open>() * (self.open.capacity() + self.last.capacity())
+    }
+
+    /// Pages that are there now.
+    pub fn resident_pages(&self) -> usize {
+        self.shelf.resident()
+    }
+
+    /// Drops all pages that hold nothing that is shown. Returns the bytes that were freed.
+    pub fn trim(&mut self) -> usize {
+        let before = self.shelf.bytes();
+        self.shelf.clock += 1;
+        while self.shelf.evict_one() {}
+        before - self.shelf.bytes()
+    }
+
+    /// True once `more` bytes fit beside what is held; pages that are not in use go if they must.
+    fn make_room(&mut self, more: usize) -> bool {
+        loop {
+            if self.bytes() + self.shelf.most_at_once() + more <= self.limit {
+                return true;
+            }
+            if !self.shelf.evict_one() {
+                return false;
+            }
+        }
+    }
+
+    /// Room for `splits` more to be applied, in all arrays that grow with the mesh.
+    fn reserve(&mut self, splits: usize) -> bool {
+        // An eighth more each time, so that growing costs little in sum; the old array is still there while the new one is filled.
+        let ask = |len: usize, cap: usize, more: usize| {
+            if len + more <= cap { 0 } else { (len + more).max(cap + cap / 8) + 64 }
+        };
+        let slots = self.fans.corners.len() - self.free.len() + 2 * splits;
+        let corners = ask(slots.max(self.fans.corners.len()), self.fans.corners.capacity(), 0);
+        let free = ask(slots.max(self.fans.corners.len()), self.free.capacity(), 0);
+        let open = ask(self.vertices + splits, self.open.capacity(), 0);
+        let last = ask(self.applied + splits, self.last.capacity(), 0);
+        let each = size_of::<Open>();
+        let bytes = 28 * corners + 4 * free + corners / 8 + each * (open + last);
+        if bytes == 0 {
+            return true;
+        }
+        if !self.make_room(bytes) {
+            return false;
+        }
+        fn grow<T>(v: &mut Vec<T>, to: usize) {
+            v.reserve_exact(to.saturating_sub(v.len()));
+        }
+        if corners > 0 {
+            grow(&mut self.fans.corners, corners);
+            grow(&mut self.fans.links, corners);
+            grow(&mut self.face_in, corners);
+            grow(&mut self.touched, corners.div_ceil(64));
+        }
+        grow(&mut self.free, free);
+        grow(&mut self.open, open);
+        grow(&mut self.last, last);
+        true
+    }
+
+    /// Node `k` is in the mesh now: what replaces it can be applied.
+    fn offer(&mut self, k: u32) -> Result<(), PagedError> {
+        let (next, bounds) = self.shelf.continuation(k);
+        if next == NONE {
+            return Ok(());
+        }
+        let entry = Entry::new(next, self.shelf.local_centre(k)?, bounds);
+        self.shelf.set_open_place(k, self.open.len() as u32);
+        self.open.push(Open { entry, node: k });
+        Ok(())
+    }
+
+    /// Node `k` is not in the mesh any more, or was replaced.
+    fn withdraw(&mut self, k: u32) {
+        let at = self.shelf.open_place(k) as usize;
+        if self.open.get(at).is_none_or(|o| o.node != k) {
+            return;
+        }
+        self.shelf.set_open_place(k, NONE);
+        self.open.swap_remove(at);
+        if let Some(moved) = self.open.get(at) {
+            self.shelf.set_open_place(moved.node, at as u32);
+        }
+    }
+
+    /// Split `i`, which is applied, can be undone.
+    fn free_split(&mut self, i: u32) -> Result<(), PagedError> {
+        let Some((node, _)) = self.shelf.parent(i) else { return Ok(()) };
+        if self.shelf.last_place(i) != NONE {
+            return Ok(());
+        }
+        let (next, bounds) = self.shelf.continuation(node);
+        if next != i {
+            return Err(Damage::Fan(i as usize).into());
+        }
+        let entry = Entry::new(i, self.shelf.local_centre(node)?, bounds);
+        self.shelf.set_last_place(i, self.last.len() as u32);
+        self.last.push(Open { entry, node });
+        Ok(())
+    }
+
+    fn hold_split(&mut self, i: u32) {
+        let at = self.shelf.last_place(i) as usize;
+        if self.last.get(at).is_none_or(|o| o.entry.split != i) {
+            return;
+        }
+        self.shelf.set_last_place(i, NONE);
+        self.last.swap_remove(at);
+        if let Some(moved) = self.last.get(at) {
+            let split = moved.entry.split;
+            self.shelf.set_last_place(split, at as u32);
+        }
+    }
+}

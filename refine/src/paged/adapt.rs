@@ -1,0 +1,317 @@
+//! From the mesh of the last frame to that of this one, fetching what it needs.
+
+use super::page::APPLIED;
+use super::shelf::Fetch;
+use super::{Open, PagedError, PagedView};
+use crate::aif::NONE;
+use crate::format::ByteRanges;
+use crate::progressive::Damage;
+use crate::selective::{Done, Lens, Limits};
+use std::cmp::Reverse;
+
+/// How far a frame may go.
+#[derive(Clone, Copy)]
+pub struct PagedLimits<'a> {
+    /// As in memory.
+    pub limits: Limits<'a>,
+    /// Chunks fetched in the frame at most; where that is too few, the mesh is coarser until later frames.
+    pub fetches: usize,
+}
+
+impl Default for PagedLimits<'_> {
+    /// None.
+    fn default() -> Self {
+        PagedLimits { limits: Limits::default(), fetches: usize::MAX }
+    }
+}
+
+/// What [`PagedView::adapt`] did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PagedDone {
+    /// As in memory; not complete either where something was left out for want of room or fetches.
+    pub done: Done,
+    /// Needed splits that were left out because there was no room for them, or for what they depend on.
+    pub no_room: usize,
+    /// Needed splits that were left out because their chunks would have been one fetch too many.
+    pub postponed: usize,
+    /// Chunks fetched.
+    pub fetched: usize,
+}
+
+/// Operations, and looks at splits, between two questions for the time: as in [`crate::selective`].
+const BETWEEN: usize = 64;
+const LOOKS: usize = 512;
+/// Needed splits are ordered by how much their errors exceed the tolerance: eight steps for each factor of two.
+const STEPS: f64 = 8.0;
+
+/// What is left of the limits.
+struct Meter<'a> {
+    limits: PagedLimits<'a>,
+    all: PagedDone,
+    since: usize,
+    looks: usize,
+    over: bool,
+    whole: bool,
+}
+
+impl Meter<'_> {
+    fn goes_on(&mut self) -> bool {
+        let (done, limits) = (&self.all.done, &self.limits.limits);
+        self.over |= done.splits + done.collapses >= limits.operations;
+        if self.since >= BETWEEN || self.looks >= LOOKS {
+            (self.since, self.looks) = (0, 0);
+            self.over |= limits.expired.is_some_and(|f| f());
+        }
+        !self.over
+    }
+}
+
+/// Where to begin looking through a list of `len`, downwards, and whether that is its end.
+fn start(resume: usize, len: usize) -> (usize, bool) {
+    if resume == 0 || resume >= len { (len, true) } else { (resume, false) }
+}
+
+/// How gathering a closure ended.
+enum Gathered {
+    Whole,
+    NoRoom,
+    Postponed,
+}
+
+impl<S: ByteRanges> PagedView<S> {
+    /// Adapts the mesh to what any of the lenses needs, as far as the limits, the memory and the fetches allow: first undoes what is not needed, then applies what is, the
+    /// worst first. Looks at all that is shown; O(valence) for every split applied or undone.
+    ///
+    /// Errors: damage, the source's. The mesh is sound then, and closed, somewhere on the way.
+    pub fn adapt(&mut self, lenses: &[Lens], limits: &PagedLimits<'_>) -> Result<PagedDone, PagedError> {
+        let mut meter = Meter {
+            limits: *limits,
+            all: PagedDone::default(),
+            since: BETWEEN,
+            looks: 0,
+            over: false,
+            whole: true,
+        };
+        self.shelf.clock += 1;
+        self.coarsen(lenses, &mut meter)?;
+        if !meter.over {
+            let result = self.refine(lenses, &mut meter);
+            self.queue.clear();
+            result?;
+        }
+        let all = &mut meter.all;
+        let nothing_left = all.done.refused + all.no_room + all.postponed == 0;
+        all.done.complete = !meter.over && meter.whole && nothing_left;
+        Ok(*all)
+    }
+
+    fn coarsen(&mut self, lenses: &[Lens], meter: &mut Meter<'_>) -> Result<(), PagedError> {
+        let keep = meter.limits.limits.hysteresis.clamp(1e-6, 1.0);
+        let wants = |o: &Open| lenses.iter().any(|l| l.wants(&o.entry, keep * l.tau()));
+        let (mut at, whole) = start(self.resume[0], self.last.len());
+        let mut stack = Vec::new();
+        while at > 0 && meter.goes_on() {
+            at = (at - 1).min(self.last.len().saturating_sub(1));
+            meter.looks += 1;
+            let Some(o) = self.last.get(at) else { break };
+            if wants(o) {
+                continue;
+            }
+            stack.push(o.entry.split);
+            while let Some(i) = stack.pop() {
+                let place = self.shelf.last_place(i) as usize;
+                let Some(o) = self.last.get(place).filter(|o| o.entry.split == i) else { continue };
+                meter.looks += 1;
+                if wants(o) {
+                    continue;
+                }
+                if !meter.goes_on() {
+                    break;
+                }
+                let needs = self.undo(i)?;
+                meter.all.done.collapses += 1;
+                meter.since += 1;
+                stack.extend(needs.into_iter().filter(|&d| d != NONE && self.is_free(d)));
+            }
+        }
+        self.resume[0] = at;
+        meter.whole &= whole;
+        Ok(())
+    }
+
+    fn refine(&mut self, lenses: &[Lens], meter: &mut Meter<'_>) -> Result<(), PagedError> {
+        let rank = |o: &Open| -> Option<u16> {
+            if !lenses.iter().any(|l| l.wants(&o.entry, l.tau())) {
+                return None;
+            }
+            let urgency = lenses.iter().map(|l| l.urgency(&o.entry)).fold(0.0, f64::max);
+            Some((urgency.max(1.0).log2() * STEPS).min(1e4) as u16)
+        };
+        let (mut at, whole) = start(self.resume[1], self.open.len());
+        while at > 0 && meter.goes_on() {
+            at -= 1;
+            meter.looks += 1;
+            let Some(o) = self.open.get(at) else { break };
+            if let Some(r) = rank(o) {
+                let split = o.entry.split;
+                self.enqueue(r, split, meter);
+            }
+        }
+        self.resume[1] = at;
+        meter.whole &= whole;
+        while let Some((_, Reverse(i))) = self.queue.pop() {
+            if self.shelf.is_applied(i) {
+                continue;
+            }
+            if !meter.goes_on() {
+                return Ok(());
+            }
+            let mut closure = std::mem::take(&mut self.closure);
+            closure.clear();
+            let gathered = self.gather(i, &mut closure, meter);
+            closure.iter().for_each(|&j| self.shelf.mark(j, false));
+            // What a split depends on was made before it.
+            closure.sort_unstable();
+            closure.dedup();
+            let applied = gathered.and_then(|g| match g {
+                Gathered::Whole => self.apply_all(&closure, i, meter, &rank),
+                Gathered::NoRoom => {
+                    meter.all.no_room += 1;
+                    Ok(())
+                }
+                Gathered::Postponed => {
+                    meter.all.postponed += 1;
+                    Ok(())
+                }
+            });
+            self.closure = closure;
+            applied?;
+        }
+        Ok(())
+    }
+
+    fn apply_all(
+        &mut self,
+        closure: &[u32],
+        i: u32,
+        meter: &mut Meter<'_>,
+        rank: &impl Fn(&Open) -> Option<u16>,
+    ) -> Result<(), PagedError> {
+        let two = |j: u32| self.shelf.page(j).is_some_and(|(p, k)| p.code[k].two_faces());
+        let more: usize = closure.iter().map(|&j| 1 + two(j) as usize).sum();
+        if self.faces + more > meter.limits.limits.faces {
+            meter.all.done.refused += 1;
+            return Ok(());
+        }
+        if !self.reserve(closure.len()) {
+            meter.all.no_room += 1;
+            return Ok(());
+        }
+        for &j in closure {
+            if !meter.goes_on() {
+                return Ok(());
+            }
+            self.apply(j)?;
+            let done = &mut meter.all.done;
+            done.splits += 1;
+            done.forced += usize::from(j != i);
+            meter.since += 1;
+            let old = self.shelf.head.base_vertices + 2 * j;
+            for k in [old, old + 1] {
+                let place = self.shelf.open_place(k) as usize;
+                if let Some(o) = self.open.get(place).filter(|o| o.node == k)
+                    && let Some(r) = rank(o)
+                {
+                    let next = o.entry.split;
+                    self.enqueue(r, next, meter);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes that a split is needed.
+    fn enqueue(&mut self, rank: u16, split: u32, meter: &mut Meter<'_>) {
+        if self.queue.len() == self.queue.capacity() {
+            let more = self.queue.capacity() / 2 + 256;
+            if !self.make_room(8 * (self.queue.capacity() + more)) {
+                meter.all.no_room += 1;
+                return;
+            }
+            self.queue.reserve_exact(more);
+        }
+        self.queue.push((rank, Reverse(split)));
+    }
+
+    /// Gathers split `i` and all it depends on that is not applied, and fetches their pages.
+    fn gather(&mut self, i: u32, out: &mut Vec<u32>, meter: &mut Meter<'_>) -> Result<Gathered, PagedError> {
+        self.shelf.clock += 1;
+        out.push(i);
+        let mut k = 0;
+        while let Some(&j) = out.get(k) {
+            if let Fetch::Missing(most) = self.shelf.ask(j) {
+                if meter.all.fetched >= meter.limits.fetches {
+                    return Ok(Gathered::Postponed);
+                }
+                if !self.make_room(most) {
+                    return Ok(Gathered::NoRoom);
+                }
+                self.shelf.fetch(j)?;
+                meter.all.fetched += 1;
+            }
+            self.shelf.mark(j, true);
+            let needs = self.shelf.needs(j).ok_or(Damage::Fan(j as usize))?;
+            for d in needs.into_iter().filter(|&d| d != NONE) {
+                if self.shelf.is_applied(d) || self.shelf.is_marked(d) {
+                    continue;
+                }
+                // Marked as soon as its page is there; until then it may be listed again.
+                match self.shelf.ask(d) {
+                    Fetch::There => self.shelf.mark(d, true),
+                    Fetch::Missing(_) if out.contains(&d) => continue,
+                    Fetch::Missing(_) => {}
+                }
+                out.push(d);
+            }
+            k += 1;
+        }
+        Ok(Gathered::Whole)
+    }
+
+    fn is_free(&self, i: u32) -> bool {
+        self.shelf.page(i).is_some_and(|(p, k)| p.flags[k] & APPLIED != 0 && p.dependents[k] == 0)
+    }
+
+    /// Applies split `i`, whose page is there, whose dependencies are applied, and for which there is room.
+    fn apply(&mut self, i: u32) -> Result<(), PagedError> {
+        self.split_faces(i)?;
+        let (node, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
+        self.withdraw(node);
+        for d in self.shelf.needs(i).into_iter().flatten().filter(|&d| d != NONE) {
+            self.hold_split(d);
+        }
+        self.free_split(i)?;
+        let old = self.shelf.head.base_vertices + 2 * i;
+        self.offer(old)?;
+        self.offer(old + 1)
+    }
+
+    /// Undoes split `i`, which is applied and free; returns what it depended on.
+    fn undo(&mut self, i: u32) -> Result<[u32; 3], PagedError> {
+        let needs = self.shelf.needs(i).ok_or(Damage::Fan(i as usize))?;
+        let (node, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
+        let old = self.shelf.head.base_vertices + 2 * i;
+        self.withdraw(old);
+        self.withdraw(old + 1);
+        self.hold_split(i);
+        self.unsplit_faces(i)?;
+        self.offer(node)?;
+        for d in needs {
+            if d != NONE && self.is_free(d) {
+                self.free_split(d)?;
+            }
+        }
+        Ok(needs)
+    }
+}

@@ -1,0 +1,139 @@
+//! The mesh of a paged view, as buffers and as a mesh.
+
+use super::PagedView;
+use crate::aif::{MeshInput, NONE, Positions, Wedges};
+use crate::format::ByteRanges;
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+use std::ops::Range;
+
+impl<S: ByteRanges> PagedView<S> {
+    /// The index buffer: three wedges a slot. A slot without a face has three equal corners. Wedges are numbered as those of the progressive mesh at full detail.
+    pub fn indices(&self) -> &[[u32; 3]] {
+        &self.fans.corners
+    }
+
+    /// The face of the progressive mesh in a slot of the index buffer; none in one that is free, or is not there.
+    pub fn face_in(&self, slot: usize) -> Option<u32> {
+        self.face_in.get(slot).copied().filter(|&f| f != NONE)
+    }
+
+    /// The slots of the faces across the three edges of the face in a slot; `None` at borders, at edges of three and more faces, and where there is no face.
+    pub fn neighbours(&self, slot: usize) -> [Option<usize>; 3] {
+        let links = self.fans.links.get(slot).copied().unwrap_or([NONE; 3]);
+        links.map(|l| Some((l >> 3) as usize).filter(|_| l != NONE))
+    }
+
+    /// The vertex of a wedge that is shown.
+    pub fn wedge_vertex(&self, w: u32) -> u32 {
+        self.shelf.wedge_vertex(w)
+    }
+
+    /// Where vertex `v` stands, model units; `None` if it is not shown.
+    pub fn position(&self, v: u32) -> Option<DVec3> {
+        if v as usize >= self.full_vertices() {
+            return None;
+        }
+        let node = Some(self.shelf.node(v)).filter(|&k| k != NONE)?;
+        self.shelf.position(node).ok()
+    }
+
+    /// The vertices shown, ascending. O(vertices of the base and of resident pages).
+    pub fn vertices(&self) -> impl Iterator<Item = u32> + '_ {
+        let n0 = self.shelf.head.base_vertices;
+        let made = self.shelf.all().flat_map(move |p| {
+            (n0 + p.first..).zip(&p.node).filter(|(_, node)| **node != NONE).map(|(v, _)| v)
+        });
+        (0..n0).chain(made)
+    }
+
+    /// The splits that are applied, ascending.
+    pub fn applied_splits(&self) -> impl Iterator<Item = u32> + '_ {
+        let n0 = self.shelf.head.base_vertices;
+        self.vertices().filter_map(move |v| v.checked_sub(n0))
+    }
+
+    /// Runs of slots of the index buffer that changed since this was last called, ascending (a few unchanged ones between two may be in), and how many wedges are new or
+    /// have other values, at most.
+    pub fn take_changes(&mut self) -> (Vec<Range<usize>>, usize) {
+        /// Unchanged slots that may lie within a run: as in [`crate::selective`].
+        const GAP: usize = 4;
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for (k, word) in self.touched.iter_mut().enumerate().filter(|(_, w)| **w != 0) {
+            let mut bits = std::mem::take(word);
+            while bits != 0 {
+                let slot = 64 * k + bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                match runs.last_mut() {
+                    Some(last) if slot <= last.end + GAP => last.end = slot + 1,
+                    _ => runs.push(slot..slot + 1),
+                }
+            }
+        }
+        (runs, std::mem::take(&mut self.touched_wedges))
+    }
+
+    /// The mesh as flat arrays: vertices, faces and wedges that are shown, numbered in the order of the file. Takes memory of its own beside the limit. O(shown, and resident
+    /// pages).
+    pub fn to_input(&self) -> MeshInput {
+        let base = &self.shelf.base.mesh;
+        let mut out = MeshInput {
+            positions: match &base.base_positions {
+                Positions::F32(_) => Positions::F32(Vec::new()),
+                Positions::F64(_) => Positions::F64(Vec::new()),
+            },
+            ..Default::default()
+        };
+        let mut number: FxHashMap<u32, u32> = FxHashMap::default();
+        for v in self.vertices() {
+            let at = self.position(v).unwrap_or_default();
+            match &mut out.positions {
+                // They are stored so: nothing is rounded.
+                Positions::F32(p) => p.push(at.as_vec3().to_array()),
+                Positions::F64(p) => p.push(at.to_array()),
+            }
+            number.insert(v, number.len() as u32);
+        }
+        let mut slots: Vec<(u32, u32)> =
+            (0u32..).zip(&self.face_in).filter(|(_, f)| **f != NONE).map(|(s, &f)| (f, s)).collect();
+        slots.sort_unstable();
+        let corners = || slots.iter().flat_map(|&(_, s)| self.fans.corners[s as usize]);
+        let of = |v: u32| number.get(&v).copied().unwrap_or(0);
+        out.corners = corners().map(|w| of(self.shelf.wedge_vertex(w))).collect();
+        if self.shelf.head.materials {
+            out.face_material = slots.iter().map(|s| self.per_face(s.0, false)).collect();
+        }
+        if self.shelf.head.groups {
+            out.face_group = slots.iter().map(|s| self.per_face(s.0, true)).collect();
+        }
+        out.wires = base.wires.iter().map(|w| w.map(of)).collect();
+        if let Some(channels) = &self.shelf.head.channels
+            && let Ok(mut wedges) = Wedges::new(channels.clone())
+        {
+            let mut used: Vec<u32> = corners().collect();
+            used.sort_unstable();
+            used.dedup();
+            let mut numbers: FxHashMap<u32, u32> = FxHashMap::default();
+            let width: usize = channels.iter().map(|c| c.width).sum();
+            for w in used {
+                let (row, present) = self.shelf.row(self.shelf.wedge_row(w));
+                let zeros = vec![0.0; width];
+                let new = wedges.push(if row.len() == width { row } else { &zeros }, present);
+                numbers.insert(w, if present == 0 { NONE } else { new });
+            }
+            wedges.corner = corners().map(|w| numbers.get(&w).copied().unwrap_or(NONE)).collect();
+            out.wedges = Some(wedges);
+        }
+        out
+    }
+
+    /// The material or the group of a face.
+    fn per_face(&self, f: u32, group: bool) -> u32 {
+        let base = &self.shelf.base.mesh;
+        let (values, at) = match self.shelf.head.maker(f).and_then(|(i, _)| self.shelf.page(i)) {
+            Some((p, _)) => (if group { &p.group } else { &p.material }, f.wrapping_sub(p.first_face)),
+            None => (if group { &base.face_group } else { &base.face_material }, f),
+        };
+        values.get(at as usize).copied().unwrap_or(NONE)
+    }
+}

@@ -1,0 +1,286 @@
+//! Chunks of splits as they are held, and the base.
+
+use crate::aif::{NONE, Positions};
+use crate::format::pages::{BaseLinks, Links};
+use crate::format::{MeshHead, SplitBlock};
+use crate::hierarchy::{Packed, SplitRows};
+use crate::progressive::{ProgressiveMesh, SplitCode, SplitKind};
+use glam::DVec3;
+
+/// Where a row of attributes is: the page, or [`NONE`] for the base, and its number there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct RowRef {
+    pub(super) page: u32,
+    pub(super) row: u32,
+}
+
+impl RowRef {
+    pub(super) const NOTHING: RowRef = RowRef { page: NONE, row: NONE };
+}
+
+/// The base and what is applied at its vertices.
+#[derive(Debug)]
+pub(super) struct Base {
+    pub(super) mesh: ProgressiveMesh,
+    pub(super) links: BaseLinks,
+    /// Where each vertex is in the list of what can be applied.
+    pub(super) open_place: Vec<u32>,
+    /// The node that each vertex is at.
+    pub(super) node: Vec<u32>,
+    /// The slot of each face.
+    pub(super) slot: Vec<u32>,
+    pub(super) wedge_vertex: Vec<u32>,
+    pub(super) wedge_row: Vec<RowRef>,
+}
+
+impl Base {
+    /// The faces of `mesh` are those of a view: it has none here, but so many.
+    pub(super) fn new(mut mesh: ProgressiveMesh, faces: usize, links: BaseLinks) -> Base {
+        let n0 = mesh.base_vertices() as u32;
+        let wedge_vertex = mesh.wedges.as_mut().map_or(Vec::new(), |w| std::mem::take(&mut w.base_vertex));
+        let wedge_row = (0..wedge_vertex.len() as u32).map(|row| RowRef { page: NONE, row }).collect();
+        Base {
+            links,
+            open_place: vec![NONE; n0 as usize],
+            node: (0..n0).collect(),
+            slot: (0..faces as u32).collect(),
+            wedge_vertex,
+            wedge_row,
+            mesh,
+        }
+    }
+
+    pub(super) fn vertices(&self) -> usize {
+        self.node.len()
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.mesh.bytes()
+            + 4 * (self.links.next.capacity() + self.open_place.capacity() + self.node.capacity())
+            + 4 * (self.slot.capacity() + self.wedge_vertex.capacity())
+            + size_of::<Packed>() * self.links.bounds.capacity()
+            + size_of::<RowRef>() * self.wedge_row.capacity()
+            + size_of::<Self>()
+    }
+}
+
+/// A split is applied.
+pub(super) const APPLIED: u8 = 1;
+/// It is in the closure that is being gathered.
+pub(super) const MARKED: u8 = 2;
+
+/// A chunk of splits, with what is applied of it.
+#[derive(Debug)]
+pub(super) struct Page {
+    pub(super) first: u32,
+    pub(super) first_face: u32,
+    pub(super) first_wedge: u32,
+    pub(super) vertex: Vec<u32>,
+    pub(super) left: Vec<u32>,
+    pub(super) right: Vec<u32>,
+    pub(super) code: Vec<SplitCode>,
+    pub(super) new_positions: Positions,
+    pub(super) moved_positions: Positions,
+    /// Moved vertices before every 64th split.
+    moved_before: Vec<u32>,
+    pub(super) links: Links,
+    /// Bounds of the splits.
+    pub(super) own: Vec<Packed>,
+    pub(super) rows: Vec<f32>,
+    pub(super) present: Vec<u64>,
+    pub(super) explicit: Vec<u32>,
+    /// Where every split has its attributes, within this page; empty without.
+    pub(super) split_rows: Vec<SplitRows>,
+    pub(super) material: Vec<u32>,
+    pub(super) group: Vec<u32>,
+    // What is applied.
+    pub(super) flags: Vec<u8>,
+    /// Applied splits that depend on each.
+    pub(super) dependents: Vec<u8>,
+    pub(super) last_place: Vec<u32>,
+    pub(super) open_place: Vec<[u32; 2]>,
+    /// The node that each vertex made here is at; [`NONE`] if it is not in the mesh.
+    pub(super) node: Vec<u32>,
+    /// The slot of each face made here.
+    pub(super) slot: Vec<u32>,
+    pub(super) wedge_vertex: Vec<u32>,
+    pub(super) wedge_row: Vec<RowRef>,
+    /// Of a row that changes a wedge, the one before.
+    pub(super) row_before: Vec<RowRef>,
+    /// Applied splits: as long as there are any, the page stays.
+    pub(super) applied: usize,
+    /// When it was used last.
+    pub(super) stamp: u64,
+}
+
+impl Page {
+    /// `None`: damage.
+    pub(super) fn new(head: &MeshHead, block: SplitBlock, own: Vec<Packed>, links: Links) -> Option<Page> {
+        let (count, faces) = (block.splits.len(), block.faces());
+        let n0 = head.base_vertices;
+        let mut face = block.first_face;
+        for k in 0..count {
+            let i = block.first + k as u32;
+            // All that a split refers to was made before it.
+            let before = |cut: u32| cut == NONE || cut >> 2 < face;
+            let (l, r) = (block.splits.left[k], block.splits.right[k]);
+            if block.splits.vertex[k] >= n0 + i || l == NONE || !before(l) || !before(r) {
+                return None;
+            }
+            face += 1 + block.splits.code[k].two_faces() as u32;
+        }
+        let with_rows = head.channels.is_some();
+        let stride: usize = head.channels.iter().flatten().map(|c| c.width).sum();
+        let split_rows = if with_rows { split_rows(&block, stride)? } else { Vec::new() };
+        let mut moved_before = Vec::with_capacity(count.div_ceil(64));
+        let mut moved = 0;
+        for (k, code) in block.splits.code.iter().enumerate() {
+            if k % 64 == 0 {
+                moved_before.push(moved);
+            }
+            moved += code.moves() as u32;
+        }
+        if moved as usize != block.moved_positions.len() || block.new_positions.len() != count {
+            return None;
+        }
+        let per_face = |values: &Vec<u32>, has: bool| values.len() == if has { faces } else { 0 };
+        if !per_face(&block.face_material, head.materials) || !per_face(&block.face_group, head.groups) {
+            return None;
+        }
+        let wedges = if with_rows { block.wedges as usize } else { 0 };
+        let rows = block.present.len();
+        let fit = |mut p: Positions| {
+            match &mut p {
+                Positions::F32(v) => v.shrink_to_fit(),
+                Positions::F64(v) => v.shrink_to_fit(),
+            }
+            p
+        };
+        fn shrink<T>(mut v: Vec<T>) -> Vec<T> {
+            v.shrink_to_fit();
+            v
+        }
+        Some(Page {
+            first: block.first,
+            first_face: block.first_face,
+            first_wedge: block.first_wedge,
+            vertex: shrink(block.splits.vertex),
+            left: shrink(block.splits.left),
+            right: shrink(block.splits.right),
+            code: shrink(block.splits.code),
+            new_positions: fit(block.new_positions),
+            moved_positions: fit(block.moved_positions),
+            moved_before,
+            links: Links {
+                parent: shrink(links.parent),
+                next: shrink(links.next),
+                outside: shrink(links.outside),
+            },
+            own: shrink(own),
+            rows: shrink(block.rows),
+            present: shrink(block.present),
+            explicit: shrink(block.explicit),
+            split_rows,
+            material: shrink(block.face_material),
+            group: shrink(block.face_group),
+            flags: vec![0; count],
+            dependents: vec![0; count],
+            last_place: vec![NONE; count],
+            open_place: vec![[NONE; 2]; count],
+            node: vec![NONE; count],
+            slot: vec![NONE; faces],
+            wedge_vertex: vec![NONE; wedges],
+            wedge_row: vec![RowRef::NOTHING; wedges],
+            row_before: vec![RowRef::NOTHING; rows],
+            applied: 0,
+            stamp: 0,
+        })
+    }
+
+    /// Where split `k` of the page puts the vertex that it splits, if it moves it.
+    #[inline]
+    pub(super) fn moved(&self, k: usize) -> Option<DVec3> {
+        self.code[k].moves().then(|| {
+            let from = k / 64 * 64;
+            let before = self.code[from..k].iter().filter(|c| c.moves()).count();
+            self.moved_positions.get(self.moved_before[k / 64] as usize + before)
+        })
+    }
+
+    /// Bytes held: the sum of all capacities.
+    pub(super) fn bytes(&self) -> usize {
+        fn of<T>(v: &Vec<T>) -> usize {
+            v.capacity() * size_of::<T>()
+        }
+        let points = |p: &Positions| match p {
+            Positions::F32(v) => of(v),
+            Positions::F64(v) => of(v),
+        };
+        let l = &self.links;
+        of(&self.vertex)
+            + of(&self.left)
+            + of(&self.right)
+            + of(&self.code)
+            + points(&self.new_positions)
+            + points(&self.moved_positions)
+            + of(&self.moved_before)
+            + of(&l.parent)
+            + of(&l.next)
+            + of(&l.outside)
+            + of(&self.own)
+            + of(&self.rows)
+            + of(&self.present)
+            + of(&self.explicit)
+            + of(&self.split_rows)
+            + of(&self.material)
+            + of(&self.group)
+            + of(&self.flags)
+            + of(&self.dependents)
+            + of(&self.last_place)
+            + of(&self.open_place)
+            + of(&self.node)
+            + of(&self.slot)
+            + of(&self.wedge_vertex)
+            + of(&self.wedge_row)
+            + of(&self.row_before)
+            + size_of::<Self>()
+    }
+
+    /// The most that a page can take, told by the directory: what its chunks say of themselves (`raw`), and the counts.
+    pub(super) fn most_bytes(raw: u64, page_raw: u64, count: u32, faces: u32, wedges: u32) -> usize {
+        let (count, faces, wedges) = (count as u64, faces as u64, wedges as u64);
+        let links = page_raw + size_of::<Packed>() as u64 * count;
+        // Rows are at least 8 bytes of `raw` each, and need as many for what they were before.
+        let attributes = 12 * count * (wedges > 0) as u64 + 12 * wedges + raw.saturating_sub(30 * count);
+        let state = (1 + 1 + 4 + 8 + 4) * count + 4 * faces + count.div_ceil(64) * 4;
+        usize::try_from(raw + links + attributes + state).unwrap_or(usize::MAX / 4) + size_of::<Page>() + 64
+    }
+}
+
+/// Where the attributes of each split of a block are. `None` if they are not all there.
+fn split_rows(block: &SplitBlock, stride: usize) -> Option<Vec<SplitRows>> {
+    let (mut wedge, mut row, mut at) = (block.first_wedge, 0u32, 0usize);
+    let mut all = Vec::with_capacity(block.splits.len());
+    for code in &block.splits.code {
+        all.push(SplitRows { wedge, row, explicit: at as u32 });
+        let twice = code.changes_rows() as u32;
+        let (new, changed) = match code.kind() {
+            SplitKind::Plain => (1, twice),
+            SplitKind::Seam => (2, 2 * twice),
+            SplitKind::Explicit => {
+                let &[pairs, changed] = block.explicit.get(at..at + 2)? else { return None };
+                let ids = 2 * pairs as usize + changed as usize + 3 + 3 * code.two_faces() as usize;
+                let entry = block.explicit.get(at + 2..(at + 2).checked_add(ids)?)?;
+                at += 2 + ids;
+                let fresh = entry[..2 * pairs as usize].chunks_exact(2).filter(|p| p[1] >= wedge).count();
+                (fresh as u32, changed)
+            }
+        };
+        wedge = wedge.checked_add(new)?;
+        row = row.checked_add(new)?.checked_add(changed)?;
+    }
+    let fits = row as usize == block.present.len()
+        && block.rows.len() == row as usize * stride
+        && wedge - block.first_wedge == block.wedges;
+    fits.then_some(all)
+}

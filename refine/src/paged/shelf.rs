@@ -1,0 +1,548 @@
+//! Which pages are there; fetching, and letting go.
+
+use super::PagedError;
+use super::page::{APPLIED, Base, MARKED, Page, RowRef};
+use crate::aif::NONE;
+use crate::format::{ByteRanges, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, pages, read_piece};
+use crate::hierarchy::Packed;
+use crate::progressive::{Damage, Fans, link_faces};
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+
+/// What a view has read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Traffic {
+    /// Bytes fetched, those fetched again counted again; head, directory and base in.
+    pub bytes_read: u64,
+    /// Bytes of the file that were fetched at least once.
+    pub bytes_touched: u64,
+    /// Requests for ranges of bytes.
+    pub requests: u64,
+    /// Chunks of splits that were decoded, those decoded again counted again.
+    pub chunks_decoded: u64,
+    /// Chunks of splits that were decoded at least once.
+    pub chunks_touched: u64,
+    /// Pages that had to go.
+    pub evictions: u64,
+}
+
+/// A chunk of splits, with the `BNDS` and the `PAGE` behind it.
+#[derive(Clone, Copy, Debug)]
+struct ChunkAt {
+    /// Its place in the directory.
+    index: u32,
+    first: u32,
+    first_wedge: u32,
+    /// The most that the page takes.
+    most: usize,
+    touched: bool,
+}
+
+/// The mesh's chunks, and those of them that are in memory.
+#[derive(Debug)]
+pub(super) struct Shelf<S> {
+    reader: Arc<RangeReader<S>>,
+    pub(super) head: MeshHead,
+    pub(super) base: Base,
+    chunks: Vec<ChunkAt>,
+    /// The chunk that holds every 1024th split.
+    index: Vec<u32>,
+    pages: Vec<Option<Box<Page>>>,
+    /// Bytes of the pages that are there.
+    held: usize,
+    resident: usize,
+    /// Counts closures: pages used in the present one stay.
+    pub(super) clock: u64,
+    /// A split may move its vertex.
+    moves: bool,
+    scratch: usize,
+    pub(super) traffic: Traffic,
+}
+
+/// Bytes that decoding a split takes on the way, at most: rings, edges and models of the decoder ([`crate::format`]), arrays that double.
+const DECODING: usize = 1024;
+/// Splits between two entries of the index.
+const STRIDE: usize = 1024;
+
+/// What it takes to get a page.
+pub(super) enum Fetch {
+    /// It is there.
+    There,
+    /// It is to be fetched, and then takes so many bytes at most.
+    Missing(usize),
+}
+
+impl<S: ByteRanges> Shelf<S> {
+    /// With the base, and its faces.
+    pub(super) fn new(reader: Arc<RangeReader<S>>, m: u32) -> Result<(Self, Fans), PagedError> {
+        let directory = reader.directory();
+        let mut traffic =
+            Traffic { bytes_read: directory.bytes(), requests: 2, bytes_touched: directory.bytes(), ..Default::default() };
+        let of = |c: &&Chunk| c.kind == ChunkType::BASE && c.mesh == m;
+        let base_chunk = *directory.chunks.iter().find(of).ok_or(FormatError::Head("no such mesh"))?;
+        let behind = |c: &Chunk, by: usize, kind: ChunkType| {
+            let next = directory.chunks.get(c.index as usize + by);
+            next.filter(|p| p.kind == kind && p.mesh == m).copied().ok_or(PagedError::NoPages)
+        };
+        let base_page = behind(&base_chunk, 1, ChunkType::PAGE)?;
+        let (head, mut mesh) = reader.base(m)?;
+        let bytes = reader.source().fetch(base_page.range()).map_err(FormatError::from)?;
+        base_page.check(&bytes)?;
+        let links = pages::read_base(&head, base_page.raw, &bytes)
+            .ok_or_else(|| base_page.damage("its contents contradict each other"))?;
+        traffic.requests += 2;
+        traffic.bytes_read += base_chunk.stored + base_page.stored;
+        traffic.bytes_touched = traffic.bytes_read;
+        let point = if head.double { 24 } else { 12 };
+        let (mut chunks, mut index, mut moves, mut scratch) = (Vec::new(), Vec::new(), false, 0);
+        let mut all = Vec::new();
+        for c in directory.chunks.iter().filter(|c| c.mesh == m) {
+            match c.kind {
+                ChunkType::SPLITS => {
+                    let bounds = behind(c, 1, ChunkType::BOUNDS)?;
+                    if (bounds.first, bounds.count) != (c.first, c.count) {
+                        return Err(bounds.damage("it is not that of the chunk before").into());
+                    }
+                    all.push((*c, behind(c, 2, ChunkType::PAGE)?));
+                }
+                ChunkType::SEQUEL => return Err(PagedError::NoPages),
+                _ => {}
+            }
+        }
+        let full = all.last().map_or(0, |(c, _)| c.first.saturating_add(c.count));
+        if full != head.splits {
+            return Err(FormatError::Head("its splits are not all there").into());
+        }
+        // Wedges at full detail are not known; a row takes 8 bytes at least.
+        let last_wedges = all.last().map_or(0, |(c, _)| (c.raw / 8).min(u32::MAX as u64) as u32);
+        for (k, &(c, p)) in all.iter().enumerate() {
+            let next = all.get(k + 1).map(|n| &n.1);
+            let wedges = match next {
+                _ if head.channels.is_none() => 0,
+                None => last_wedges,
+                Some(n) => n
+                    .first_face
+                    .checked_sub(p.first_face)
+                    .ok_or_else(|| p.damage("its wedges do not follow those before"))?,
+            };
+            let faces = head.first_face(c.first + c.count) - head.first_face(c.first);
+            moves |= c.raw != c.count as u64 * (18 + point);
+            scratch = scratch.max((p.range().end - c.offset) as usize + DECODING * c.count as usize);
+            while index.len() * STRIDE < (c.first + c.count) as usize {
+                index.push(k as u32);
+            }
+            chunks.push(ChunkAt {
+                index: c.index,
+                first: c.first,
+                first_wedge: p.first_face,
+                most: Page::most_bytes(c.raw, p.raw, c.count, faces, wedges),
+                touched: false,
+            });
+        }
+        let faces: Vec<[u32; 3]> = match &mesh.wedges {
+            None => mesh.base_faces.clone(),
+            Some(w) => {
+                let of = |w: &Vec<u32>, k: u32| w.get(k as usize).copied().unwrap_or(0);
+                mesh.base_faces.iter().map(|f| f.map(|k| of(&w.base_vertex, k))).collect()
+            }
+        };
+        let corners = std::mem::take(&mut mesh.base_faces);
+        let wedges = head.base_wedges;
+        if corners.iter().flatten().any(|&w| w >= wedges) {
+            return Err(base_chunk.damage("its contents contradict each other").into());
+        }
+        let links_of_faces = link_faces(&faces, mesh.base_vertices());
+        let base = Base::new(mesh, corners.len(), links);
+        let pages = chunks.iter().map(|_| None).collect();
+        let shelf = Shelf {
+            head,
+            base,
+            chunks,
+            index,
+            pages,
+            held: 0,
+            resident: 0,
+            clock: 0,
+            moves,
+            scratch,
+            traffic,
+            reader,
+        };
+        Ok((shelf, Fans { corners, links: links_of_faces }))
+    }
+
+    /// Bytes held; the directory of the file is in.
+    pub(super) fn bytes(&self) -> usize {
+        let head = 4 * (self.head.single.capacity() + self.head.levels.capacity());
+        self.base.bytes()
+            + head
+            + size_of::<ChunkAt>() * self.chunks.capacity()
+            + 4 * self.index.capacity()
+            + 8 * self.pages.capacity()
+            + size_of::<Chunk>() * self.reader.directory().chunks.capacity()
+            + self.held
+    }
+
+    /// What decoding a chunk takes on the way, at most.
+    pub(super) fn most_at_once(&self) -> usize {
+        self.scratch
+    }
+
+    pub(super) fn resident(&self) -> usize {
+        self.resident
+    }
+
+    /// The chunk of split `i`, which there is.
+    #[inline]
+    fn chunk_of(&self, i: u32) -> usize {
+        let mut k = self.index.get(i as usize / STRIDE).map_or(0, |&k| k as usize);
+        while self.chunks.get(k + 1).is_some_and(|c| c.first <= i) {
+            k += 1;
+        }
+        k
+    }
+
+    /// The page of split `i` if it is there, and the split's place in it.
+    #[inline]
+    pub(super) fn page(&self, i: u32) -> Option<(&Page, usize)> {
+        let page = self.pages.get(self.chunk_of(i))?.as_deref()?;
+        let k = i.wrapping_sub(page.first) as usize;
+        (k < page.vertex.len()).then_some((page, k))
+    }
+
+    #[inline]
+    pub(super) fn page_mut(&mut self, i: u32) -> Option<(&mut Page, usize)> {
+        let c = self.chunk_of(i);
+        let page = self.pages.get_mut(c)?.as_deref_mut()?;
+        let k = i.wrapping_sub(page.first) as usize;
+        (k < page.vertex.len()).then_some((page, k))
+    }
+
+    /// What it takes to have the page of split `i`. Notes that it is in use.
+    pub(super) fn ask(&mut self, i: u32) -> Fetch {
+        let (c, clock) = (self.chunk_of(i), self.clock);
+        match self.pages.get_mut(c) {
+            Some(Some(page)) => {
+                page.stamp = clock;
+                Fetch::There
+            }
+            _ => Fetch::Missing(self.chunks.get(c).map_or(0, |c| c.most)),
+        }
+    }
+
+    /// Fetches and decodes the page of split `i`.
+    pub(super) fn fetch(&mut self, i: u32) -> Result<(), PagedError> {
+        let at = self.chunk_of(i);
+        let directory = self.reader.directory();
+        let place = self.chunks.get(at).map_or(0, |c| c.index as usize);
+        let Some(&[chunk, bounds, beside]) = directory.chunks.get(place..place + 3) else {
+            return Err(FormatError::Head("no such chunk").into());
+        };
+        // One range: they stand side by side.
+        let bytes =
+            self.reader.source().fetch(chunk.offset..beside.range().end).map_err(FormatError::from)?;
+        self.traffic.requests += 1;
+        self.traffic.bytes_read += bytes.len() as u64;
+        let part = |c: &Chunk| {
+            let end = (c.range().end - chunk.offset).min(bytes.len() as u64) as usize;
+            &bytes[((c.offset - chunk.offset) as usize).min(end)..end]
+        };
+        let block = match read_piece(&chunk, Some(&self.head), part(&chunk))? {
+            Piece::Splits(block) => block,
+            _ => return Err(chunk.damage("it is no chunk of splits").into()),
+        };
+        let own = match read_piece(&bounds, None, part(&bounds))? {
+            Piece::Bounds(own) => own.of,
+            _ => return Err(bounds.damage("it holds no bounds").into()),
+        };
+        beside.check(part(&beside))?;
+        let damaged = |c: &Chunk| c.damage("its contents contradict each other");
+        let known = (&block.splits.vertex[..], &own[..]);
+        let links = pages::read(&self.head, chunk.first, known, beside.raw, part(&beside))
+            .ok_or_else(|| damaged(&beside))?;
+        if self.head.channels.is_some() && block.first_wedge != beside.first_face {
+            return Err(damaged(&beside).into());
+        }
+        let mut page = Page::new(&self.head, *block, own, links).ok_or_else(|| damaged(&chunk))?;
+        page.stamp = self.clock;
+        self.held += page.bytes();
+        self.resident += 1;
+        self.traffic.chunks_decoded += 1;
+        if let Some(c) = self.chunks.get_mut(at).filter(|c| !c.touched) {
+            c.touched = true;
+            self.traffic.chunks_touched += 1;
+            self.traffic.bytes_touched += bytes.len() as u64;
+        }
+        self.pages[at] = Some(Box::new(page));
+        Ok(())
+    }
+
+    /// Drops the page that was used longest ago and of which nothing is applied; false if there is none.
+    pub(super) fn evict_one(&mut self) -> bool {
+        let clock = self.clock;
+        let idle = |p: &&(usize, &Page)| p.1.applied == 0 && p.1.stamp < clock;
+        let there = self.pages.iter().enumerate().filter_map(|(k, p)| Some((k, p.as_deref()?)));
+        let oldest = there.filter(|p| idle(&p)).min_by_key(|(k, p)| (p.stamp, *k)).map(|o| o.0);
+        let Some(page) = oldest.and_then(|k| self.pages[k].take()) else { return false };
+        self.held -= page.bytes();
+        self.resident -= 1;
+        self.traffic.evictions += 1;
+        true
+    }
+
+    /// Resident pages, ascending.
+    pub(super) fn all(&self) -> impl Iterator<Item = &Page> {
+        self.pages.iter().filter_map(|p| p.as_deref())
+    }
+
+    #[inline]
+    pub(super) fn is_applied(&self, i: u32) -> bool {
+        self.page(i).is_some_and(|(p, k)| p.flags[k] & APPLIED != 0)
+    }
+
+    /// Marks split `i` as gathered, or not, if its page is there.
+    pub(super) fn mark(&mut self, i: u32, on: bool) {
+        if let Some((p, k)) = self.page_mut(i) {
+            p.flags[k] = if on { p.flags[k] | MARKED } else { p.flags[k] & !MARKED };
+        }
+    }
+
+    #[inline]
+    pub(super) fn is_marked(&self, i: u32) -> bool {
+        self.page(i).is_some_and(|(p, k)| p.flags[k] & MARKED != 0)
+    }
+
+    /// The node that split `i` replaces, and its vertex; `None` if its page is not there.
+    #[inline]
+    pub(super) fn parent(&self, i: u32) -> Option<(u32, u32)> {
+        self.page(i).map(|(p, k)| (p.links.parent[k], p.vertex[k]))
+    }
+
+    /// What split `i` depends on; [`NONE`] for the base.
+    #[inline]
+    pub(super) fn needs(&self, i: u32) -> Option<[u32; 3]> {
+        let (p, k) = self.page(i)?;
+        let maker = |cut: u32| {
+            if cut == NONE { NONE } else { self.head.maker(cut >> 2).map_or(NONE, |m| m.0) }
+        };
+        Some([self.maker(p.links.parent[k]), maker(p.left[k]), maker(p.right[k])])
+    }
+
+    /// The split that made a node; [`NONE`] for the base's.
+    #[inline]
+    pub(super) fn maker(&self, node: u32) -> u32 {
+        node.checked_sub(self.head.base_vertices).map_or(NONE, |k| k >> 1)
+    }
+
+    /// The page of a node's maker and its place there, and the side of the node; `None` for nodes of the base.
+    #[inline]
+    fn at_node(&self, node: u32) -> Option<(&Page, usize, usize)> {
+        let k = node.checked_sub(self.head.base_vertices)?;
+        self.page(k >> 1).map(|(p, at)| (p, at, (k & 1) as usize))
+    }
+
+    /// The split that replaces a node that is in the mesh, or [`NONE`], and its bounds.
+    pub(super) fn continuation(&self, node: u32) -> (u32, Packed) {
+        let base = &self.base.links;
+        if let Some(&next) = base.next.get(node as usize) {
+            return (next, base.bounds[node as usize]);
+        }
+        let Some((p, k, side)) = self.at_node(node) else { return (NONE, Packed::default()) };
+        let next = p.links.next[k][side];
+        if next == NONE {
+            return (NONE, Packed::default());
+        }
+        if let Some(&own) = p.own.get(next.wrapping_sub(p.first) as usize) {
+            return (next, own);
+        }
+        match p.links.outside.binary_search_by_key(&next, |o| o.0) {
+            Ok(at) => (next, p.links.outside[at].1),
+            Err(_) => (NONE, Packed::default()),
+        }
+    }
+
+    #[inline]
+    pub(super) fn open_place(&self, node: u32) -> u32 {
+        match self.base.open_place.get(node as usize) {
+            Some(&place) => place,
+            None => self.at_node(node).map_or(NONE, |(p, k, side)| p.open_place[k][side]),
+        }
+    }
+
+    #[inline]
+    pub(super) fn set_open_place(&mut self, node: u32, place: u32) {
+        if let Some(at) = self.base.open_place.get_mut(node as usize) {
+            *at = place;
+            return;
+        }
+        let j = node - self.head.base_vertices;
+        if let Some((p, k)) = self.page_mut(j >> 1) {
+            p.open_place[k][(j & 1) as usize] = place;
+        }
+    }
+
+    #[inline]
+    pub(super) fn last_place(&self, i: u32) -> u32 {
+        self.page(i).map_or(NONE, |(p, k)| p.last_place[k])
+    }
+
+    #[inline]
+    pub(super) fn set_last_place(&mut self, i: u32, place: u32) {
+        if let Some((p, k)) = self.page_mut(i) {
+            p.last_place[k] = place;
+        }
+    }
+
+    /// The node that vertex `v` is at; [`NONE`] if it is not in the mesh.
+    #[inline]
+    pub(super) fn node(&self, v: u32) -> u32 {
+        match v.checked_sub(self.head.base_vertices) {
+            None => self.base.node[v as usize],
+            Some(i) => self.page(i).map_or(NONE, |(p, k)| p.node[k]),
+        }
+    }
+
+    #[inline]
+    pub(super) fn set_node(&mut self, v: u32, node: u32) {
+        match v.checked_sub(self.head.base_vertices) {
+            None => self.base.node[v as usize] = node,
+            Some(i) => {
+                if let Some((p, k)) = self.page_mut(i) {
+                    p.node[k] = node;
+                }
+            }
+        }
+    }
+
+    /// The slot of face `f`; [`NONE`] if it is not in the mesh.
+    #[inline]
+    pub(super) fn slot_of(&self, f: u32) -> u32 {
+        match self.head.maker(f) {
+            None => self.base.slot.get(f as usize).copied().unwrap_or(NONE),
+            Some((i, _)) => self.page(i).map_or(NONE, |(p, _)| {
+                p.slot.get(f.wrapping_sub(p.first_face) as usize).copied().unwrap_or(NONE)
+            }),
+        }
+    }
+
+    #[inline]
+    pub(super) fn set_slot(&mut self, f: u32, slot: u32) {
+        if let Some((i, _)) = self.head.maker(f)
+            && let Some((p, _)) = self.page_mut(i)
+            && let Some(s) = p.slot.get_mut(f.wrapping_sub(p.first_face) as usize)
+        {
+            *s = slot;
+        }
+    }
+
+    /// The chunk that makes wedge `w`, which is none of the base's.
+    #[inline]
+    fn chunk_of_wedge(&self, w: u32) -> usize {
+        self.chunks.partition_point(|c| c.first_wedge <= w).saturating_sub(1)
+    }
+
+    /// The vertex of wedge `w`, which is in the mesh.
+    #[inline]
+    pub(super) fn wedge_vertex(&self, w: u32) -> u32 {
+        if self.head.channels.is_none() {
+            return w;
+        }
+        if let Some(&v) = self.base.wedge_vertex.get(w as usize) {
+            return v;
+        }
+        let page = self.pages.get(self.chunk_of_wedge(w)).and_then(|p| p.as_deref());
+        page.and_then(|p| p.wedge_vertex.get(w.wrapping_sub(p.first_wedge) as usize)).copied().unwrap_or(NONE)
+    }
+
+    pub(super) fn set_wedge_vertex(&mut self, w: u32, v: u32) {
+        if let Some(at) = self.base.wedge_vertex.get_mut(w as usize) {
+            *at = v;
+            return;
+        }
+        let c = self.chunk_of_wedge(w);
+        if let Some(p) = self.pages.get_mut(c).and_then(|p| p.as_deref_mut())
+            && let Some(at) = p.wedge_vertex.get_mut(w.wrapping_sub(p.first_wedge) as usize)
+        {
+            *at = v;
+        }
+    }
+
+    /// The row of wedge `w`.
+    pub(super) fn wedge_row(&self, w: u32) -> RowRef {
+        if let Some(&r) = self.base.wedge_row.get(w as usize) {
+            return r;
+        }
+        let page = self.pages.get(self.chunk_of_wedge(w)).and_then(|p| p.as_deref());
+        let row = page.and_then(|p| p.wedge_row.get(w.wrapping_sub(p.first_wedge) as usize));
+        row.copied().unwrap_or(RowRef::NOTHING)
+    }
+
+    pub(super) fn set_wedge_row(&mut self, w: u32, row: RowRef) {
+        if let Some(at) = self.base.wedge_row.get_mut(w as usize) {
+            *at = row;
+            return;
+        }
+        let c = self.chunk_of_wedge(w);
+        if let Some(p) = self.pages.get_mut(c).and_then(|p| p.as_deref_mut())
+            && let Some(at) = p.wedge_row.get_mut(w.wrapping_sub(p.first_wedge) as usize)
+        {
+            *at = row;
+        }
+    }
+
+    /// The chunk of split `i`, as [`RowRef`] names it.
+    pub(super) fn page_number(&self, i: u32) -> u32 {
+        self.chunk_of(i) as u32
+    }
+
+    /// The values of a row, and the channels it has.
+    pub(super) fn row(&self, r: RowRef) -> (&[f32], u64) {
+        let stride: usize = self.head.channels.iter().flatten().map(|c| c.width).sum();
+        let (rows, present) = match self.pages.get(r.page as usize).and_then(|p| p.as_deref()) {
+            Some(p) => (&p.rows[..], &p.present[..]),
+            None => match &self.base.mesh.wedges {
+                Some(w) if r.page == NONE => (&w.rows[..], &w.present[..]),
+                _ => return (&[], 0),
+            },
+        };
+        let at = r.row as usize;
+        match (rows.get(at.saturating_mul(stride)..(at + 1).saturating_mul(stride)), present.get(at)) {
+            (Some(values), Some(&present)) => (values, present),
+            _ => (&[], 0),
+        }
+    }
+
+    /// Where node `k`, which is in the mesh or was before it was split, stands.
+    pub(super) fn position(&self, node: u32) -> Result<DVec3, PagedError> {
+        let n0 = self.head.base_vertices;
+        let mut k = node;
+        loop {
+            let Some(at) = k.checked_sub(n0) else { return Ok(self.base.mesh.base_positions.get(k as usize)) };
+            let i = at >> 1;
+            let Some((p, local)) = self.page(i) else { return Err(Damage::Fan(i as usize).into()) };
+            if at & 1 == 1 {
+                return Ok(p.new_positions.get(local));
+            }
+            if !self.moves {
+                // It stands where its vertex always does.
+                return match p.vertex[local].checked_sub(n0) {
+                    None => Ok(self.base.mesh.base_positions.get(p.vertex[local] as usize)),
+                    Some(j) => match self.page(j) {
+                        Some((p, local)) => Ok(p.new_positions.get(local)),
+                        None => Err(Damage::Fan(i as usize).into()),
+                    },
+                };
+            }
+            if let Some(to) = p.moved(local) {
+                return Ok(to);
+            }
+            k = p.links.parent[local];
+        }
+    }
+
+    /// The same about the origin of the bounds.
+    pub(super) fn local_centre(&self, node: u32) -> Result<Vec3, PagedError> {
+        Ok((self.position(node)? - self.base.links.origin).as_vec3())
+    }
+}

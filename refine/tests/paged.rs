@@ -1,0 +1,304 @@
+//! View-dependent refinement out of core: the same meshes as in memory, within a limit, from few bytes.
+
+mod common;
+
+use common::{NAMES, assert_same, options, sample};
+use glam::{DMat4, DVec3};
+use progmesh_refine::format::{EncodeError, EncodeOptions, FormatError, RangeReader, decode, encode};
+use progmesh_refine::hierarchy::{self, Bounds, Hierarchy};
+use progmesh_refine::paged::{PagedError, PagedLimits, PagedView};
+use progmesh_refine::progressive::build;
+use progmesh_refine::selective::{Cull, Done, Lens, Limits, View};
+use progmesh_refine::simplify::{Method, Placement, Quiet};
+use progmesh_refine::view::{Camera, CameraParameters, Projection};
+use std::sync::Arc;
+
+/// Pixels, by frame: finest where a part is seen.
+const TAU: [f64; 3] = [1.0, 6.0, 12.0];
+const PLENTY: usize = 1 << 30;
+
+/// A file with pages; small meshes, so bounds are measured in little.
+fn file(name: &str, faces: usize, placement: Option<Placement>) -> Vec<u8> {
+    let mut pm = build(sample(name, faces, 5), &options(Method::Quadric, placement), &Quiet).unwrap().mesh;
+    let o = hierarchy::Options { rounds: 0, ..Default::default() };
+    pm.bounds = Some(Arc::new(Bounds::measure(&pm, &o).unwrap()));
+    let o = EncodeOptions::default().with_any_order(true).with_pages(true).with_chunk(Some(512));
+    encode(&[pm], &[], &[], &o).unwrap()
+}
+
+/// The file in memory: with the bounds it has.
+fn in_memory(bytes: &[u8]) -> Arc<Hierarchy> {
+    let mesh = Arc::new(decode(bytes).unwrap().meshes.remove(0));
+    assert!(mesh.bounds.is_some());
+    Arc::new(Hierarchy::new(mesh, &Default::default()).unwrap())
+}
+
+fn paged(bytes: &[u8], limit: usize) -> PagedView<&[u8]> {
+    PagedView::new(Arc::new(RangeReader::new(bytes).unwrap()), 0, limit).unwrap()
+}
+
+fn camera(centre: DVec3, diagonal: f64, turn: f64, far: f64) -> Camera {
+    let eye = centre + far * diagonal * DVec3::new(turn.cos(), turn.sin(), 0.3);
+    // From near by it sees a part.
+    let fov_y_deg = if far < 0.7 { 12.0 } else { 45.0 };
+    Camera::new(&CameraParameters {
+        eye,
+        target: centre + 0.1 * diagonal * DVec3::new(turn.sin(), 0.2, turn.cos()),
+        up: DVec3::Z,
+        projection: Projection::Perspective { fov_y_deg },
+        width: 640,
+        height: 480,
+        near: 1e-3 * diagonal,
+        far: 1e3 * diagonal,
+    })
+    .unwrap()
+}
+
+fn same(view: &View, paged: &PagedView<&[u8]>) {
+    let own: Vec<u32> = view.applied().map(|i| i as u32).collect();
+    assert_eq!(paged.applied_splits().collect::<Vec<_>>(), own);
+    assert_same(&view.to_input(), &paged.to_input());
+    assert_eq!((view.face_count(), view.vertex_count()), (paged.face_count(), paged.vertex_count()));
+}
+
+/// On one flight both show the same meshes, frame by frame.
+fn fly(bytes: &[u8], limit: usize, frames: usize) -> PagedView<&[u8]> {
+    let h = in_memory(bytes);
+    let (centre, diagonal) = h.extent();
+    let mut view = View::new(h.clone());
+    let mut out = paged(bytes, limit);
+    assert_eq!(out.extent(), (centre, diagonal));
+    for k in 0..frames {
+        let c = camera(centre, diagonal, 0.7 * k as f64, 0.6 + 0.5 * (k % 3) as f64);
+        let tau = TAU[k % 3];
+        let lens = Lens::new(&h, &c, &DMat4::IDENTITY, tau, Cull::All).unwrap();
+        let done = view.adapt(&lens, &Limits::default());
+        let lens = out.lens(&c, &DMat4::IDENTITY, tau, Cull::All).unwrap();
+        let found = out.adapt(&[lens], &PagedLimits::default()).unwrap();
+        let what = |d: Done| (d.splits, d.collapses, d.complete, d.refused);
+        assert_eq!(what(found.done), what(done), "frame {k}");
+        assert_eq!((found.no_room, found.postponed), (0, 0), "frame {k}");
+        assert!(out.bytes() <= limit);
+        same(&view, &out);
+    }
+    out
+}
+
+#[test]
+fn the_same_meshes_as_in_memory_frame_by_frame() {
+    for name in NAMES {
+        fly(&file(name, 3000, None), PLENTY, 4);
+    }
+    fly(&file("scan", 6000, Some(Placement::Endpoint)), PLENTY, 6);
+}
+
+/// Of a mesh of several chunks, read through little memory: what is not shown goes, and comes again.
+#[test]
+fn a_limit_is_kept_and_changes_no_mesh() {
+    let bytes = file("scan", 24_000, None);
+    let roomy = fly(&bytes, PLENTY, 6);
+    let all = roomy.traffic();
+    assert!(all.bytes_touched <= all.bytes_read && all.bytes_touched <= bytes.len() as u64);
+    assert!(all.chunks_touched == all.chunks_decoded && all.evictions == 0, "{all:?}");
+    assert!(all.chunks_touched > 4, "{all:?}");
+    // The least with which every frame is whole: found by halving.
+    let (mut low, mut high) = (0, 2 * roomy.bytes() + (16 << 20));
+    let whole = |limit: usize| {
+        let Ok(mut view) = PagedView::new(Arc::new(RangeReader::new(&bytes[..]).unwrap()), 0, limit) else {
+            return None;
+        };
+        let (centre, diagonal) = view.extent();
+        let mut all = true;
+        for k in 0..6 {
+            let c = camera(centre, diagonal, 0.7 * k as f64, 0.6 + 0.5 * (k % 3) as f64);
+            let lens = view.lens(&c, &DMat4::IDENTITY, TAU[k % 3], Cull::All).unwrap();
+            let done = view.adapt(&[lens], &PagedLimits::default()).unwrap();
+            assert!(view.bytes() <= limit, "{} of {limit}", view.bytes());
+            assert_eq!(done.done.complete, done.no_room == 0);
+            assert_closed(&view);
+            all &= done.done.complete;
+        }
+        Some(all)
+    };
+    assert_eq!(whole(high), Some(true));
+    let mut short = 0;
+    for _ in 0..10 {
+        let middle = (low + high) / 2;
+        match whole(middle) {
+            Some(true) => high = middle,
+            other => {
+                short += usize::from(other.is_some());
+                low = middle;
+            }
+        }
+    }
+    assert!(short > 0, "some limits are too small for the view, but not for the base");
+    let tight = fly(&bytes, high + (64 << 10), 6);
+    assert!(tight.traffic().evictions > 0, "{:?}", tight.traffic());
+    assert_eq!(tight.traffic().bytes_touched, all.bytes_touched);
+}
+
+/// What is applied is closed: all links are mutual, and every vertex of a face is shown.
+fn assert_closed(view: &PagedView<&[u8]>) {
+    for slot in (0..view.indices().len()).filter(|&s| view.face_in(s).is_some()) {
+        let corners = view.indices()[slot].map(|w| view.wedge_vertex(w));
+        assert!(corners.iter().all(|&v| view.position(v).is_some()));
+        for (k, other) in view.neighbours(slot).into_iter().enumerate() {
+            let Some(other) = other else { continue };
+            assert!(view.face_in(other).is_some());
+            let theirs = view.indices()[other].map(|w| view.wedge_vertex(w));
+            assert!(theirs.contains(&corners[k]) && theirs.contains(&corners[(k + 1) % 3]));
+        }
+    }
+}
+
+#[test]
+fn a_few_fetches_a_frame_lead_to_the_same_mesh() {
+    let bytes = file("scan", 24_000, None);
+    let h = in_memory(&bytes);
+    let (centre, diagonal) = h.extent();
+    let c = camera(centre, diagonal, 0.3, 0.7);
+    let mut view = View::new(h.clone());
+    view.adapt(&Lens::new(&h, &c, &DMat4::IDENTITY, 0.5, Cull::All).unwrap(), &Limits::default());
+    let mut out = paged(&bytes, PLENTY);
+    let lens = out.lens(&c, &DMat4::IDENTITY, 0.5, Cull::All).unwrap();
+    let limits = PagedLimits { fetches: 1, ..PagedLimits::default() };
+    let mut faces = Vec::new();
+    for _ in 0..200 {
+        let done = out.adapt(&[lens], &limits).unwrap();
+        assert!(done.fetched <= 1 && done.done.complete == (done.postponed == 0));
+        assert_closed(&out);
+        faces.push(out.face_count());
+        if done.done.complete {
+            break;
+        }
+    }
+    assert!(faces.len() > 3 && faces.is_sorted(), "{faces:?}");
+    same(&view, &out);
+}
+
+#[test]
+fn it_shows_all_there_is_and_goes_back_to_the_base() {
+    for (name, placement) in [("scan", Some(Placement::Endpoint)), ("cad", None), ("terrain", None)] {
+        let bytes = file(name, 8000, placement);
+        let h = in_memory(&bytes);
+        let (centre, diagonal) = h.extent();
+        let c = camera(centre, diagonal, 1.0, 1.0);
+        let (mut view, mut out) = (View::new(h.clone()), paged(&bytes, PLENTY));
+        let base = out.to_input();
+        for tau in [0.0, f64::INFINITY, 2.0, f64::INFINITY] {
+            let lens = Lens::new(&h, &c, &DMat4::IDENTITY, tau, Cull::None).unwrap();
+            view.adapt(&lens, &Limits::default());
+            out.adapt(&[lens], &PagedLimits::default()).unwrap();
+            same(&view, &out);
+            if tau == 0.0 {
+                assert_eq!((out.applied(), out.face_count()), (out.splits(), out.full_faces()));
+            }
+        }
+        assert_same(&base, &out.to_input());
+        // Nothing is shown of any page: all can go, and what is left is what there was at first, but for room to grow.
+        assert!(out.trim() > 0);
+        assert_eq!(out.resident_pages(), 0);
+    }
+}
+
+#[test]
+fn limits_of_faces_and_operations_are_kept() {
+    let bytes = file("scan", 12_000, None);
+    let mut out = paged(&bytes, PLENTY);
+    let (centre, diagonal) = out.extent();
+    let lens = out.lens(&camera(centre, diagonal, 0.0, 0.8), &DMat4::IDENTITY, 0.5, Cull::All).unwrap();
+    let most = out.face_count() + 1000;
+    let faces = Limits { faces: most, ..Limits::default() };
+    let done = out.adapt(&[lens], &PagedLimits { limits: faces, ..Default::default() }).unwrap();
+    assert!(done.done.refused > 0 && out.face_count() <= most && out.face_count() > most - 300);
+    let few = Limits { operations: 300, ..Limits::default() };
+    let mut frames = 0;
+    loop {
+        let done = out.adapt(&[lens], &PagedLimits { limits: few, ..Default::default() }).unwrap();
+        assert!(done.done.splits + done.done.collapses <= 300);
+        frames += 1;
+        assert!(frames < 1000);
+        if done.done.complete {
+            break;
+        }
+    }
+    assert!(frames > 3);
+    let mut whole = paged(&bytes, PLENTY);
+    whole.adapt(&[lens], &PagedLimits::default()).unwrap();
+    assert!(whole.applied_splits().eq(out.applied_splits()));
+}
+
+#[test]
+fn a_near_view_reads_a_part_of_the_file() {
+    let bytes = file("terrain", 50_000, None);
+    let mut out = paged(&bytes, PLENTY);
+    let begun = out.traffic().bytes_read;
+    assert!(begun < bytes.len() as u64 / 8, "{begun} of {}", bytes.len());
+    let (centre, diagonal) = out.extent();
+    let c = Camera::new(&CameraParameters {
+        eye: centre + DVec3::new(0.3, 0.3, 0.1) * diagonal,
+        target: centre + DVec3::new(0.2, 0.25, 0.0) * diagonal,
+        up: DVec3::Z,
+        projection: Projection::Perspective { fov_y_deg: 30.0 },
+        width: 320,
+        height: 240,
+        near: 1e-3 * diagonal,
+        far: 10.0 * diagonal,
+    })
+    .unwrap();
+    let lens = out.lens(&c, &DMat4::IDENTITY, 1.0, Cull::All).unwrap();
+    let done = out.adapt(&[lens], &PagedLimits::default()).unwrap();
+    let t = out.traffic();
+    assert!(done.done.complete && done.fetched > 0 && done.done.splits > 100, "{done:?}");
+    assert!(t.bytes_touched < bytes.len() as u64 / 2, "{} of {}", t.bytes_touched, bytes.len());
+}
+
+#[test]
+fn what_cannot_be_paged_is_told() {
+    let pm = build(sample("scan", 2000, 5), &options(Method::Quadric, None), &Quiet).unwrap().mesh;
+    for o in [EncodeOptions::default(), EncodeOptions::default().with_alone(true)] {
+        let bytes = encode(&[pm.clone()], &[], &[], &o).unwrap();
+        let reader = Arc::new(RangeReader::new(&bytes[..]).unwrap());
+        assert_eq!(PagedView::new(reader, 0, PLENTY).unwrap_err(), PagedError::NoPages);
+    }
+    let pages = EncodeOptions::default().with_pages(true);
+    let result = encode(std::slice::from_ref(&pm), &[], &[], &pages);
+    assert_eq!(result.unwrap_err(), EncodeError::NoBounds(0));
+    let bytes = file("scan", 3000, None);
+    let reader = Arc::new(RangeReader::new(&bytes[..]).unwrap());
+    assert!(matches!(PagedView::new(reader.clone(), 1, PLENTY), Err(PagedError::Format(_))));
+    match PagedView::new(reader.clone(), 0, 1000) {
+        Err(PagedError::Memory { limit: 1000, needed }) => {
+            assert!(PagedView::new(reader, 0, needed).is_ok());
+        }
+        other => panic!("{:?}", other.map(|v| v.bytes())),
+    }
+}
+
+/// Every byte of a chunk turned over is an error that names it, or changes nothing: checksums stand before all else.
+#[test]
+fn damage_is_an_error() {
+    let bytes = file("torus", 4000, None);
+    let reader = RangeReader::new(&bytes[..]).unwrap();
+    let chunks = reader.directory().chunks.clone();
+    for c in chunks.iter().filter(|c| c.stored > 0) {
+        let mut bad = bytes.clone();
+        bad[(c.offset + c.stored / 2) as usize] ^= 0x10;
+        let reader = Arc::new(RangeReader::new(&bad[..]).unwrap());
+        let result = PagedView::new(reader, 0, PLENTY).and_then(|mut view| {
+            let (centre, diagonal) = view.extent();
+            let lens = view.lens(&camera(centre, diagonal, 0.0, 1.0), &DMat4::IDENTITY, 0.0, Cull::None);
+            let before = view.bytes();
+            let result = view.adapt(&[lens.unwrap()], &PagedLimits::default());
+            assert!(view.bytes() >= before);
+            assert_closed(&view);
+            result
+        });
+        assert!(
+            matches!(&result, Err(PagedError::Format(FormatError::Chunk { index, .. })) if *index == c.index),
+            "chunk {}: {result:?}",
+            c.index
+        );
+    }
+}
