@@ -1,12 +1,12 @@
 //! View-dependent refinement out of core: of a `.pm` of any size only the chunks that a view needs are read, and no more memory is held than a limit.
 //!
-//! A [`PagedView`] is to a mesh of a file what a [`crate::selective::View`] is to one in memory. The file's chunks must be ones that are read alone, each with a `PAGE`
+//! A [`PagedView`] is to a mesh of a file what a [`crate::selective::View`] is to one in memory. The file's chunks must be ones that are read alone, each with bounds and a `PAGE`
 //! beside it ([`crate::format::EncodeOptions::pages`]). Resident are the base, the file's directory, and the *pages* (chunks of splits, decoded) that hold applied splits; others stay
 //! as long as there is room, the least recently used go first.
 //!
-//! A page says of every vertex it makes which split replaces it, and gives that split's bounds. So a view knows whether it needs a split before it has the split's chunk: a chunk
-//! is fetched when a split in it is needed, or when one that is needed depends on a split in it. Beginning takes time and memory in proportion to the base and the directory, not
-//! to the splits.
+//! A page says of every vertex it makes which split replaces it, and has that split's bounds, be it in another chunk. So a view knows whether it needs a split before it has the
+//! split's chunk: one is fetched when a split in it is needed, or when one that is needed depends on a split in it. Beginning takes time and memory in proportion to the base and
+//! the directory, not to the splits.
 //!
 //! Guaranteed: at rest, with room and fetches enough, the mesh is that of a [`crate::selective::View`] with the same bounds, the least closed set; at every time the set is closed, so there are
 //! no cracks. [`PagedView::bytes`] never exceeds the limit: where that is too small, or fetches are limited, the mesh is coarser than asked, and
@@ -44,11 +44,13 @@ pub enum PagedError {
     Damage(#[from] Damage),
     /// The chunks cannot be read alone, or have no links beside them.
     #[error(
-        "it was not written for refining out of core: write it with random access (`encode --random-access`)"
+        "it was not written for refining out of core: write it with random access and bounds (`progmesh encode --random-access --bounds`)"
     )]
     NoPages,
     /// Not even the coarsest mesh fits into the limit.
-    #[error("the limit of {limit} bytes is too small: {needed} are needed for the base, the directory and one chunk")]
+    #[error(
+        "the limit of {limit} bytes is too small: {needed} are needed for the base, the directory and one chunk"
+    )]
     Memory {
         /// Bytes.
         limit: usize,

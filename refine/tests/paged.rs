@@ -258,7 +258,7 @@ fn a_near_view_reads_a_part_of_the_file() {
 fn what_cannot_be_paged_is_told() {
     let pm = build(sample("scan", 2000, 5), &options(Method::Quadric, None), &Quiet).unwrap().mesh;
     for o in [EncodeOptions::default(), EncodeOptions::default().with_alone(true)] {
-        let bytes = encode(&[pm.clone()], &[], &[], &o).unwrap();
+        let bytes = encode(std::slice::from_ref(&pm), &[], &[], &o).unwrap();
         let reader = Arc::new(RangeReader::new(&bytes[..]).unwrap());
         assert_eq!(PagedView::new(reader, 0, PLENTY).unwrap_err(), PagedError::NoPages);
     }

@@ -25,6 +25,7 @@ Examples:
   progmesh encode bunny.obj bunny.pm
   progmesh encode scan.ply scan.pm --placement endpoint --any-order
   progmesh encode dragon.ply dragon.pm --bounds
+  progmesh encode city.ply city.pm --random-access --bounds
   progmesh encode scene.glb scene.pm --quantize 14
   progmesh encode horse.ply horse.pm --method nsa --epsilon 12")]
 pub(crate) struct Args {
@@ -44,7 +45,8 @@ pub(crate) struct Args {
     /// Chunks that can be read alone, in any order, for views that load only what they need: larger by half
     #[arg(long, help_heading = "File")]
     random_access: bool,
-    /// Measure and write what view-dependent refinement decides by, so that extract and fly begin at once: some 5 bytes a vertex
+    /// Measure and write what view-dependent refinement decides by, so that extract and fly begin at once: some 5 bytes a vertex; with --random-access also what
+    /// extract and fly need for --memory
     #[arg(long, help_heading = "File")]
     bounds: bool,
     /// Print one JSON object about the run on standard output (see docs/json.md)
@@ -108,7 +110,8 @@ impl Args {
             let options = EncodeOptions::default()
                 .with_any_order(self.any_order)
                 .with_quantize(self.quantize)
-                .with_alone(self.random_access);
+                .with_alone(self.random_access)
+                .with_pages(self.random_access && self.bounds);
             let bytes = encode_progressive(&built.scene, &options)
                 .map_err(|e| Failure::Output(format!("{out}: {e}")))?;
             let encode = encoding.elapsed().as_secs_f64();

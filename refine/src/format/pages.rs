@@ -107,11 +107,8 @@ fn code<C: Coder>(
     // Every node has a number.
     end.checked_mul(2)?.checked_add(n0)?;
     let mut codec = Codec::default();
-    let mut links = Links {
-        parent: Vec::with_capacity(count),
-        next: vec![[NONE; 2]; count],
-        ..Links::default()
-    };
+    let mut links =
+        Links { parent: Vec::with_capacity(count), next: vec![[NONE; 2]; count], ..Links::default() };
     // The node that each vertex is at, once a split of the chunk has split it; and of vertices made here.
     let mut roots: FxHashMap<u32, u32> = FxHashMap::default();
     let mut made: Vec<u32> = Vec::with_capacity(count);

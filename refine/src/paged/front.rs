@@ -42,8 +42,7 @@ impl<S: ByteRanges> PagedView<S> {
 
     fn explicit(&self, i: u32, s: &Known) -> Result<Explicit, Damage> {
         let Some((p, _)) = self.shelf.page(i) else { return Err(Damage::Fan(i as usize)) };
-        Explicit::read(&p.explicit, s.explicit, s.code.two_faces(), s.wedge)
-            .ok_or(Damage::Wedges(i as usize))
+        Explicit::read(&p.explicit, s.explicit, s.code.two_faces(), s.wedge).ok_or(Damage::Wedges(i as usize))
     }
 
     /// Applies split `i`, whose page is there and whose dependencies are applied. O(valence).

@@ -3,7 +3,9 @@
 use super::PagedError;
 use super::page::{APPLIED, Base, MARKED, Page, RowRef};
 use crate::aif::NONE;
-use crate::format::{ByteRanges, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, pages, read_piece};
+use crate::format::{
+    ByteRanges, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, pages, read_piece,
+};
 use crate::hierarchy::Packed;
 use crate::progressive::{Damage, Fans, link_faces};
 use glam::{DVec3, Vec3};
@@ -77,8 +79,12 @@ impl<S: ByteRanges> Shelf<S> {
     /// With the base, and its faces.
     pub(super) fn new(reader: Arc<RangeReader<S>>, m: u32) -> Result<(Self, Fans), PagedError> {
         let directory = reader.directory();
-        let mut traffic =
-            Traffic { bytes_read: directory.bytes(), requests: 2, bytes_touched: directory.bytes(), ..Default::default() };
+        let mut traffic = Traffic {
+            bytes_read: directory.bytes(),
+            requests: 2,
+            bytes_touched: directory.bytes(),
+            ..Default::default()
+        };
         let of = |c: &&Chunk| c.kind == ChunkType::BASE && c.mesh == m;
         let base_chunk = *directory.chunks.iter().find(of).ok_or(FormatError::Head("no such mesh"))?;
         let behind = |c: &Chunk, by: usize, kind: ChunkType| {
@@ -94,6 +100,10 @@ impl<S: ByteRanges> Shelf<S> {
         traffic.requests += 2;
         traffic.bytes_read += base_chunk.stored + base_page.stored;
         traffic.bytes_touched = traffic.bytes_read;
+        let numbers = |n: u32| head.splits.checked_mul(2).and_then(|s| s.checked_add(n));
+        if numbers(head.base_vertices).is_none() || numbers(head.base_faces).is_none_or(|f| f >= 1 << 29) {
+            return Err(FormatError::Head("more splits than ids can name").into());
+        }
         let point = if head.double { 24 } else { 12 };
         let (mut chunks, mut index, mut moves, mut scratch) = (Vec::new(), Vec::new(), false, 0);
         let mut all = Vec::new();
@@ -518,7 +528,9 @@ impl<S: ByteRanges> Shelf<S> {
         let n0 = self.head.base_vertices;
         let mut k = node;
         loop {
-            let Some(at) = k.checked_sub(n0) else { return Ok(self.base.mesh.base_positions.get(k as usize)) };
+            let Some(at) = k.checked_sub(n0) else {
+                return Ok(self.base.mesh.base_positions.get(k as usize));
+            };
             let i = at >> 1;
             let Some((p, local)) = self.page(i) else { return Err(Damage::Fan(i as usize).into()) };
             if at & 1 == 1 {
