@@ -1,8 +1,8 @@
 //! The `.pm` file: progressive meshes as a stream of chunks. `FORMAT.md` specifies it.
 //!
 //! A file has a directory, the bases, then the splits, coarse to fine: by bands of error, within a band subtree by subtree. So every beginning that ends
-//! with a chunk is a mesh, and each chunk is one range of bytes. By default a chunk refers to the mesh that those before it make, which takes a third to a quarter of the bits for
-//! connectivity; with [`EncodeOptions::alone`] each can be read alone. [`encode`] writes, [`decode`] reads all, [`PmReader`] reads a stream as it arrives,
+//! with a chunk is a mesh, and each chunk is one range of bytes. Each can be read alone: it repeats, in a fifth to a third of its bytes, the splits that its own build on. With
+//! [`EncodeOptions::sequential`] a chunk refers to the mesh that those before it make instead. [`encode`] writes, [`decode`] reads all, [`PmReader`] reads a stream as it arrives,
 //! [`RangeReader`] fetches chunks in any order.
 //!
 //! Guaranteed: what was written is read bit for bit (errors of splits, which are estimates, are rounded up); the same bytes for every number of
@@ -12,8 +12,8 @@
 mod assembly;
 mod base;
 mod bounds;
+mod codec;
 mod coder;
-mod connect;
 mod container;
 mod extras;
 mod input_order;
@@ -25,7 +25,6 @@ mod plan;
 mod read;
 mod residual;
 mod rows;
-mod sequel;
 mod splits;
 mod walk;
 mod write;

@@ -51,6 +51,12 @@ fn full(pm: &ProgressiveMesh) -> MeshInput {
     c.to_ordered_input()
 }
 
+/// Chunks that follow each other, some that can be read alone, and all in one.
+fn kinds() -> [EncodeOptions; 3] {
+    let small = EncodeOptions::default().with_chunk(Some(150));
+    [small.clone().with_sequential(true), small, EncodeOptions::default()]
+}
+
 fn one(pm: &ProgressiveMesh, options: &EncodeOptions) -> Vec<u8> {
     encode(std::slice::from_ref(pm), &[], &[], options).unwrap()
 }
@@ -64,8 +70,8 @@ fn a_file_returns_the_input_bit_for_bit_whatever_made_it() {
             let input = mesh.to_input();
             for o in runs() {
                 let pm = build(mesh.clone(), &o, &Quiet).unwrap().mesh;
-                let decoded = [false, true].map(|alone| {
-                    let bytes = one(&pm, &EncodeOptions::default().with_alone(alone));
+                let decoded = kinds().map(|options| {
+                    let bytes = one(&pm, &options);
                     let decoded = decode(&bytes).unwrap();
                     assert!(decoded.report.complete && decoded.report.damage.is_none());
                     assert_eq!(decoded.report.streams.total(), bytes.len() as u64);
@@ -92,8 +98,8 @@ proptest! {
         let mesh = sample(NAMES[name], faces, seed);
         let input = mesh.to_input();
         let pm = build(mesh, &runs()[run], &Quiet).unwrap().mesh;
-        for alone in [false, true] {
-            let decoded = decode(&one(&pm, &EncodeOptions::default().with_alone(alone))).unwrap();
+        for options in kinds() {
+            let decoded = decode(&one(&pm, &options)).unwrap();
             assert_same(&full(&decoded.meshes[0]), &input);
         }
     }
@@ -134,7 +140,7 @@ impl Read for Trickle<'_> {
 #[test]
 fn a_stream_in_single_bytes_brings_base_then_ever_finer_meshes() {
     let (meshes, turns) = several();
-    let bytes = encode(&meshes, &turns, b"x", &EncodeOptions::default()).unwrap();
+    let bytes = encode(&meshes, &turns, b"x", &kinds()[1]).unwrap();
     let whole = decode(&bytes).unwrap();
     for step in [1, 7, 4096] {
         let mut r = PmReader::new(Trickle(&bytes, step)).unwrap();
@@ -143,7 +149,7 @@ fn a_stream_in_single_bytes_brings_base_then_ever_finer_meshes() {
             let Some(pm) = r.mesh(0) else { continue };
             let mut c = pm.cursor().unwrap();
             c.seek(usize::MAX).unwrap();
-            if chunk.mesh == 0 && chunk.kind == ChunkType::SEQUEL {
+            if chunk.mesh == 0 && chunk.kind == ChunkType::SPLITS {
                 assert!(pm.splits.len() > splits);
                 splits = pm.splits.len();
             }
@@ -157,7 +163,7 @@ fn a_stream_in_single_bytes_brings_base_then_ever_finer_meshes() {
 #[test]
 fn chunks_are_read_alone_and_in_any_order() {
     let (meshes, turns) = several();
-    let options = EncodeOptions::default().with_alone(true);
+    let options = EncodeOptions::default().with_chunk(Some(100));
     let bytes = encode(&meshes, &turns, &[], &options).unwrap();
     let whole = decode(&encode(&meshes, &turns, &[], &options.with_any_order(true)).unwrap()).unwrap();
     let r = RangeReader::new(&bytes[..]).unwrap();
@@ -179,7 +185,7 @@ fn chunks_are_read_alone_and_in_any_order() {
 #[test]
 fn chunks_that_follow_each_other_can_be_fetched_one_by_one_and_say_what_is_missing() {
     let (meshes, turns) = several();
-    let bytes = encode(&meshes, &turns, &[], &EncodeOptions::default()).unwrap();
+    let bytes = encode(&meshes, &turns, &[], &kinds()[0]).unwrap();
     let whole = decode(&bytes).unwrap();
     let r = RangeReader::new(&bytes[..]).unwrap();
     let mut parts = Assembly::new(r.directory());
@@ -208,8 +214,7 @@ fn chunks_that_follow_each_other_can_be_fetched_one_by_one_and_say_what_is_missi
 #[test]
 fn bytes_do_not_depend_on_the_number_of_threads() {
     let (meshes, turns) = several();
-    for alone in [false, true] {
-        let options = EncodeOptions::default().with_alone(alone);
+    for options in kinds() {
         let runs = [1, 2, 5].map(|n| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
             pool.install(|| {
@@ -228,8 +233,8 @@ fn victims() -> [Vec<u8>; 2] {
     let given = vec![0.25; all.meshes[2].splits.len()];
     let bounds = Bounds::with_errors(&all.meshes[2], &given, Guarantee::Proven).unwrap();
     all.meshes[2].bounds = Some(Arc::new(bounds));
-    [false, true].map(|alone| {
-        let options = EncodeOptions::default().with_alone(alone);
+    [false, true].map(|sequential| {
+        let options = EncodeOptions::default().with_chunk(Some(60)).with_sequential(sequential);
         encode(&all.meshes, &all.turns, b"a scene", &options).unwrap()
     })
 }

@@ -42,8 +42,12 @@ pub(crate) struct Args {
     /// Leave the order of vertices, faces and corners out, and what makes triangles polygons
     #[arg(long, help_heading = "File")]
     any_order: bool,
-    /// Chunks that can be read alone, in any order, for views that load only what they need: larger by half
+    /// Chunks that follow each other, none readable without those before it: smaller by a tenth to a third
     #[arg(long, help_heading = "File")]
+    sequential: bool,
+    /// Chunks that can be read alone, in any order, for views that load only what they need: the default; with --bounds also what
+    /// extract and fly need for --memory
+    #[arg(long, help_heading = "File", conflicts_with = "sequential")]
     random_access: bool,
     /// Measure and write what view-dependent refinement decides by, so that extract and fly begin at once: some 5 bytes a vertex; with --random-access also what
     /// extract and fly need for --memory
@@ -110,7 +114,7 @@ impl Args {
             let options = EncodeOptions::default()
                 .with_any_order(self.any_order)
                 .with_quantize(self.quantize)
-                .with_alone(self.random_access)
+                .with_sequential(self.sequential)
                 .with_pages(self.random_access && self.bounds);
             let bytes = encode_progressive(&built.scene, &options)
                 .map_err(|e| Failure::Output(format!("{out}: {e}")))?;

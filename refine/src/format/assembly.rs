@@ -1,10 +1,10 @@
 //! Meshes put together from the chunks of a file, and what was found on the way.
 
 use super::base::MeshHead;
+use super::codec::{self, Sequel};
 use super::container::{Chunk, ChunkType, Directory, FormatError};
 use super::input_order;
 use super::read::Piece;
-use super::sequel::{self, Sequel};
 use super::splits::{self, SplitBlock};
 use crate::hierarchy::Bounds;
 use crate::progressive::{InputOrder, ProgressiveMesh};
@@ -54,10 +54,10 @@ impl Part {
         }
         let state = match &mut self.sequel {
             Some(state) => state,
-            none => none.insert(Sequel::new(&self.head, &self.mesh)?),
+            none => none.insert(Sequel::new(&self.head, self.head.start.take()?)),
         };
         let at = (chunk.first, chunk.first_face);
-        sequel::read(&self.head, state, at, chunk.count as usize, chunk.raw, bytes)
+        codec::read(&self.head, state, false, at, (chunk.count as usize, chunk.raw), bytes)
     }
 }
 

@@ -1,5 +1,6 @@
 //! The chunk that begins a mesh: what is true of all of it, and the mesh before the first split.
 
+use super::codec::Start;
 use super::coder::{Coder, Decoder, Encoder, Number, put_varint, take_varint};
 use super::places::{self, Lattice, MAX_LATTICES, Places};
 use super::rows::Rows;
@@ -37,6 +38,8 @@ pub struct MeshHead {
     pub quantisation_error: f64,
     /// Faces at full detail of which quantising put two corners at one place.
     pub flat_faces: u32,
+    /// The base, for those who read chunks alone.
+    pub(super) start: Start,
 }
 
 const DOUBLE: u8 = 1;
@@ -380,7 +383,7 @@ pub(super) fn raw_bytes(h: &MeshHead) -> u64 {
 /// `None`: damage, or arrays that take other than `raw` bytes.
 pub(super) fn read(bytes: &[u8], raw: u64) -> Option<(MeshHead, ProgressiveMesh)> {
     let mut rest = bytes;
-    let head = MeshHead::read(&mut rest).filter(|h| raw_bytes(h) == raw)?;
+    let mut head = MeshHead::read(&mut rest).filter(|h| raw_bytes(h) == raw)?;
     let mut pm = ProgressiveMesh {
         base_positions: places::empty(head.double),
         new_positions: places::empty(head.double),
@@ -394,5 +397,6 @@ pub(super) fn read(bytes: &[u8], raw: u64) -> Option<(MeshHead, ProgressiveMesh)
     };
     let mut d = Decoder::new(rest)?;
     code_base(&mut d, &head, &mut pm)?;
+    head.start = Start::new(&pm)?;
     Some((head, pm)).filter(|_| !d.spent())
 }

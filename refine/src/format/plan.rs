@@ -1,6 +1,7 @@
 //! The order of the splits in a file, and how it is cut into chunks.
 //!
-//! Bands of error come one after the other; as errors nest along dependencies, that is an order splits may have. Within a band, the vertices alive at its start are
+//! Bands of error come one after the other; as errors nest along dependencies, that is an order splits may have. A band ends where it has made a given multiple of the
+//! vertices that it began with. Within a band, the vertices alive at its start are
 //! put in the order of their descent (a vertex's descendants side by side), and a chunk takes the splits of a run of them. A split
 //! that depends on one of a later chunk of its band waits for that chunk. Within a chunk splits come in sweeps over its vertices ([`super::sweep`]).
 
@@ -9,18 +10,33 @@ use super::splits::error_level;
 use crate::aif::NONE;
 use crate::progressive::ProgressiveMesh;
 
-/// Splits of a chunk, aimed at. Larger chunks are smaller in sum, but more has to be fetched for a region.
-pub(super) const CHUNK: usize = 8192;
-/// The first band has at least so many.
-const LEAST: usize = 1500;
-/// Other bands with fewer splits are joined with the next.
-const SMALL: usize = 300;
-/// Parts of the mesh whose bands begin at errors of their own, evenly spread, so that at every time some have just been refined and others
-/// are about to be: the mesh never is much coarser in one half than in the other.
-const SEGMENTS: u32 = 2;
-/// Quarters of an octave of error in a band: a factor of 2 in distance, of 4 in squared distance, which is what methods count in. With both numbers the first 10, 25
-/// and 50 % of the bytes have at most 1.17 times the rms of the method's own mesh on bunny, horse, igea and dragon; bands twice as wide, up to 1.7.
-const BAND: u32 = 4;
+/// How splits are divided into bands and chunks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layout {
+    /// Splits of a chunk, at most but for those of a single vertex. The first band, which needs nothing but the base, has a quarter of that, or less where there are few.
+    chunk: usize,
+    /// A band makes so many vertices of one.
+    growth: f64,
+    /// So far back from the end the last band of the first segment begins, in bands.
+    last: f64,
+}
+
+/// Parts of the mesh whose bands begin at counts of their own, evenly spread, so that at every time some have just been refined and others are about to
+/// be: the mesh never is much coarser in one part than in another.
+const SEGMENTS: usize = 2;
+
+impl Layout {
+    /// For chunks that are read alone: wide bands, as a chunk repeats what its band builds on. On bunny and horse the first 10, 25 and 50 % of the bytes have at most
+    /// 1.35 times the rms of the method's own mesh; with a growth of 4, 1.63, for 1.7 bits a split less of connectivity.
+    pub(super) fn alone(chunk: Option<u32>) -> Layout {
+        Layout { chunk: chunk.unwrap_or(16_384).max(1) as usize, growth: 3.0, last: 0.6 }
+    }
+
+    /// For chunks that follow each other.
+    pub(super) fn sequential(chunk: Option<u32>) -> Layout {
+        Layout { chunk: chunk.unwrap_or(8192).max(1) as usize, growth: 2.0, last: 0.5 }
+    }
+}
 
 /// Consecutive splits of a plan that make a chunk.
 #[derive(Clone, Copy, Debug)]
@@ -63,15 +79,16 @@ impl Forest {
 }
 
 impl Plan {
-    /// A chunk's roots come by number if chunks are read alone, else along the curve. `None` if the splits refer to what does not exist.
-    pub(super) fn new(pm: &ProgressiveMesh, alone: bool, chunk: usize) -> Option<Plan> {
+    /// `None` if the splits refer to what does not exist.
+    pub(super) fn new(pm: &ProgressiveMesh, layout: Layout) -> Option<Plan> {
         let n = pm.splits.len();
         let n0 = pm.base_vertices();
         if pm.splits.vertex.iter().zip(n0..).any(|(&v, count)| v as usize >= count) {
             return None;
         }
-        let rank = ranks(pm);
-        let bands = bands(pm, &rank);
+        let base = base_order(pm);
+        let rank = ranks(pm, &base);
+        let bands = bands(pm, &rank, layout);
         let forest = Forest::new(pm);
         // The vertex at the start of the band that each split descends from.
         let mut root = vec![NONE; pm.vertices()];
@@ -90,17 +107,17 @@ impl Plan {
             chunk: vec![u32::MAX; n],
             slot: (0..n0 as u32).chain(std::iter::repeat_n(NONE, n)).collect(),
             order: Vec::with_capacity(n),
-            curve: (!alone).then(|| Curve::new(pm)),
+            labels: labels(&base),
         };
         let mut plan = Plan::default();
-        let segments = if pm.levels.len() > 2 { 1 } else { SEGMENTS };
+        let segments = if pm.levels.len() > 2 { 1 } else { SEGMENTS as u32 };
         // What has to wait for splits of other segments waits for the next band of its own.
         let mut waiting = vec![Vec::new(); segments as usize];
         let mut number = 0;
         for band in keys.chunk_by(|a, b| a.0 >> 32 == b.0 >> 32) {
             let name = (band[0].0 >> 32) as u32;
             let segment = (name.saturating_sub(1) % segments) as usize;
-            let aim = band.len().div_ceil(band.len().div_ceil(chunk.max(1)));
+            let aim = band.len().div_ceil(band.len().div_ceil(layout.chunk));
             let (mut rest, mut subtree) = (band, 0);
             while !rest.is_empty() || (segments == 1 && !waiting[0].is_empty()) {
                 let mut end = aim.min(rest.len());
@@ -127,23 +144,18 @@ impl Plan {
             }
         }
         // At the end nothing more can be in the way: each round brings at least the first of what waits.
-        let mut band = plan.pieces.last().map_or(0, |p| p.band);
-        while schedule.order.len() < n {
-            let (before, mut subtree) = (schedule.order.len(), 0);
-            band += 1;
-            for wait in &mut waiting {
-                let start = schedule.order.len();
-                *wait = schedule.add(std::mem::take(wait), number);
-                number += 1;
-                let count = schedule.order.len() - start;
-                if count > 0 {
-                    plan.pieces.push(Piece { count, band, subtree });
-                    subtree += 1;
-                }
-            }
-            if schedule.order.len() == before {
+        let band = plan.pieces.last().map_or(0, |p| p.band) + 1;
+        let (mut rest, mut subtree) = (waiting.concat(), 0);
+        while !rest.is_empty() {
+            let before = schedule.order.len();
+            rest = schedule.add(rest, number);
+            number += 1;
+            let count = schedule.order.len() - before;
+            if count == 0 {
                 return None;
             }
+            plan.pieces.push(Piece { count, band, subtree });
+            subtree += 1;
         }
         plan.order = schedule.order;
         plan.levels = pm.levels.clone();
@@ -151,8 +163,8 @@ impl Plan {
     }
 }
 
-/// The band of every split: the method's levels where it has any, else by error.
-fn bands(pm: &ProgressiveMesh, rank: &[u32]) -> Vec<u32> {
+/// The band of every split: the method's levels where it has any, else by count, in the order of their errors.
+fn bands(pm: &ProgressiveMesh, rank: &[u32], layout: Layout) -> Vec<u32> {
     let n = pm.splits.len();
     if pm.levels.len() > 2 {
         let mut band = 0;
@@ -165,49 +177,38 @@ fn bands(pm: &ProgressiveMesh, rank: &[u32]) -> Vec<u32> {
             })
             .collect();
     }
-    let level: Vec<u32> = pm.splits.error.iter().map(|&e| error_level(e)).collect();
-    let most = level.iter().copied().max().unwrap_or(0);
-    // The coarsest splits are one band, whatever their errors.
-    let mut counts = vec![0usize; most as usize + 1];
-    level.iter().for_each(|&l| counts[l as usize] += 1);
-    let (mut start, mut size) = (most, 0);
-    while size < LEAST && start > 0 {
-        size += counts[start as usize];
-        start -= 1;
-    }
-    // Below, the bands of each segment begin a part of a band later than those of the one before.
+    // Coarse to fine.
+    let mut order: Vec<u32> = (0..n as u32).collect();
+    order.sort_by_key(|&i| std::cmp::Reverse(error_level(pm.splits.error[i as usize])));
+    let (first, rest) =
+        order.split_at((n / 16).clamp(layout.chunk.div_ceil(16), layout.chunk.div_ceil(4)).min(n));
     let n0 = pm.base_vertices();
-    let share = pm.vertices().div_ceil(SEGMENTS as usize).max(1);
-    let of = |(i, &l): (usize, &u32)| {
-        if l > start {
-            return 0;
-        }
-        let segment = rank[n0 + i] / share as u32;
-        let phase = BAND / SEGMENTS * (SEGMENTS - 1 - segment);
-        let own = (start - l + phase) / BAND;
-        1 + own * SEGMENTS + segment
+    let share = pm.vertices().div_ceil(SEGMENTS).max(1);
+    let segment = |v: usize| rank[v] as usize / share;
+    let mut all = [0usize; SEGMENTS];
+    (0..pm.vertices()).for_each(|v| all[segment(v)] += 1);
+    let mut count = [0usize; SEGMENTS];
+    (0..n0).for_each(|v| count[segment(v)] += 1);
+    first.iter().for_each(|&i| count[segment(n0 + i as usize)] += 1);
+    // Counted from the end, band k of segment s begins where it has its last count divided by growth^(k + last + s / segments).
+    let start = |s: usize, k: u32| {
+        all[s] as f64 * layout.growth.powf(-(k as f64 + layout.last + s as f64 / SEGMENTS as f64))
     };
-    let mut bands: Vec<u32> = level.iter().enumerate().map(of).collect();
-    // Small bands are joined with the next of their segment.
-    let mut counts = vec![0usize; bands.iter().max().map_or(0, |&b| b as usize + 1)];
-    bands.iter().for_each(|&b| counts[b as usize] += 1);
-    let mut joined: Vec<u32> = (0..counts.len() as u32).collect();
-    for segment in 1..=SEGMENTS as usize {
-        let (mut from, mut size) = (segment, 0);
-        let mut left: usize = counts.iter().skip(segment).step_by(SEGMENTS as usize).sum();
-        for b in (segment..counts.len()).step_by(SEGMENTS as usize) {
-            size += counts[b];
-            left -= counts[b];
-            if (size >= SMALL && left >= SMALL) || left == 0 {
-                (from..=b).step_by(SEGMENTS as usize).for_each(|k| joined[k] = b as u32);
-                if left == 0 {
-                    break;
-                }
-                (from, size) = (b + SEGMENTS as usize, 0);
-            }
+    // No band begins shortly behind the first.
+    let most: [u32; SEGMENTS] = std::array::from_fn(|s| {
+        (0..64).take_while(|&k| start(s, k) > count[s] as f64 * layout.growth.sqrt()).count() as u32
+    });
+    let latest = most.iter().copied().max().unwrap_or(0);
+    let mut bands = vec![0; n];
+    let mut now = most;
+    for &i in rest {
+        let s = segment(n0 + i as usize);
+        count[s] += 1;
+        while now[s] > 0 && count[s] as f64 > start(s, now[s] - 1) {
+            now[s] -= 1;
         }
+        bands[i as usize] = 1 + (latest - now[s]) * SEGMENTS as u32 + (SEGMENTS - 1 - s) as u32;
     }
-    bands.iter_mut().for_each(|b| *b = joined[*b as usize]);
     bands
 }
 
@@ -242,28 +243,66 @@ impl Curve {
     }
 }
 
-/// The place of every vertex in the order of descent: those of the base along a curve through space, every other behind the one it is
-/// split from.
-fn ranks(pm: &ProgressiveMesh) -> Vec<u32> {
-    let n0 = pm.base_vertices();
+/// The vertices of the base along a curve through space.
+pub(super) fn base_order(pm: &ProgressiveMesh) -> Vec<u32> {
     let curve = Curve::new(pm);
     let mut base: Vec<(u32, u32)> =
-        (0..n0 as u32).map(|v| (curve.at(places::point(&pm.base_positions, v as usize)), v)).collect();
+        (0..pm.base_vertices()).map(|v| (curve.at(places::point(&pm.base_positions, v)), v as u32)).collect();
     base.sort_unstable();
+    base.into_iter().map(|b| b.1).collect()
+}
+
+/// The place of every vertex in the order of descent: those of the base along the curve, every other behind the one it is split from.
+fn ranks(pm: &ProgressiveMesh, base: &[u32]) -> Vec<u32> {
+    let n0 = pm.base_vertices();
     let mut next = vec![NONE; pm.vertices()];
-    base.windows(2).for_each(|w| next[w[0].1 as usize] = w[1].1);
+    base.windows(2).for_each(|w| next[w[0] as usize] = w[1]);
     for (&v, new) in pm.splits.vertex.iter().zip(n0..) {
         next[new] = next[v as usize];
         next[v as usize] = new as u32;
     }
     let mut rank = vec![0; next.len()];
-    let (mut v, mut k) = (base.first().map_or(NONE, |b| b.1), 0);
+    let (mut v, mut k) = (base.first().copied().unwrap_or(NONE), 0);
     while v != NONE {
         rank[v as usize] = k;
         k += 1;
         v = next[v as usize];
     }
     rank
+}
+
+/// The place of a vertex in the order of descent, as far as its own ancestors tell: so chunks that know only some vertices agree about them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Label {
+    at: u64,
+    splits: u8,
+}
+
+impl Label {
+    /// Of the vertex of the base that is the `k`-th along the curve.
+    pub(super) fn base(k: u32) -> Label {
+        Label { at: (k as u64) << 32, splits: 0 }
+    }
+
+    /// Halves what the vertex has for its descendants, and gives the new one the upper half; beyond 32 times they share a place.
+    #[inline]
+    pub(super) fn split(&mut self) -> Label {
+        self.splits = self.splits.saturating_add(1).min(33);
+        Label { at: self.at + (1u64 << 32 >> self.splits), splits: self.splits }
+    }
+
+    /// What counts, with the vertex's number.
+    #[inline]
+    pub(super) fn key(self) -> u64 {
+        self.at
+    }
+}
+
+/// Labels of the base's vertices, given their order.
+pub(super) fn labels(base: &[u32]) -> Vec<Label> {
+    let mut labels = vec![Label::default(); base.len()];
+    base.iter().zip(0..).for_each(|(&v, k)| labels[v as usize] = Label::base(k));
+    labels
 }
 
 /// Makes the order, chunk by chunk.
@@ -275,8 +314,8 @@ struct Schedule<'a> {
     /// Number in the file of a vertex, once it has one.
     slot: Vec<u32>,
     order: Vec<u32>,
-    /// Along which a chunk's roots come.
-    curve: Option<Curve>,
+    /// By number in the file: of the vertices so far.
+    labels: Vec<Label>,
 }
 
 impl Schedule<'_> {
@@ -284,19 +323,15 @@ impl Schedule<'_> {
     fn add(&mut self, mut candidates: Vec<u32>, number: u32) -> Vec<u32> {
         candidates.sort_unstable();
         let n0 = self.pm.base_vertices();
-        let mut roots: Vec<(u32, u32, u32)> = Vec::new();
+        let mut roots: Vec<(u64, u32, u32)> = Vec::new();
         candidates.retain(|&i| {
             let on = self.forest.on[i as usize];
             let can = on.iter().all(|&d| d == NONE || self.chunk[d as usize] != u32::MAX);
             if can {
                 self.chunk[i as usize] = number;
                 if on[0] == NONE || self.chunk[on[0] as usize] != number {
-                    let v = self.pm.splits.vertex[i as usize] as usize;
-                    let key = self.curve.map_or(0, |c| match v.checked_sub(n0) {
-                        Some(made) => c.at(places::point(&self.pm.new_positions, made)),
-                        None => c.at(places::point(&self.pm.base_positions, v)),
-                    });
-                    roots.push((key, self.slot[v], i));
+                    let v = self.slot[self.pm.splits.vertex[i as usize] as usize];
+                    roots.push((self.labels[v as usize].key(), v, i));
                 }
             }
             !can
@@ -320,6 +355,9 @@ impl Schedule<'_> {
                 }
                 self.slot[n0 + i as usize] = (n0 + self.order.len()) as u32;
                 self.order.push(i);
+                let v = self.slot[self.pm.splits.vertex[i as usize] as usize];
+                let new = self.labels[v as usize].split();
+                self.labels.push(new);
                 let here = |s: &u32| *s != NONE && self.chunk[*s as usize] == number;
                 pass.extend(Some(self.forest.first[i as usize]).filter(here));
                 pass.extend(Some(self.forest.again[i as usize]).filter(here));

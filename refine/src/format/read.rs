@@ -3,8 +3,9 @@
 use super::assembly::{Assembly, Decoded, StreamSizes};
 use super::base::{self, MeshHead};
 use super::bounds;
+use super::codec::{self, Sequel};
 use super::container::{Chunk, ChunkType, Directory, FormatError, HEAD};
-use super::splits::{self, SplitBlock};
+use super::splits::SplitBlock;
 use crate::hierarchy::Bounds;
 use crate::progressive::ProgressiveMesh;
 use std::io::Read;
@@ -44,8 +45,10 @@ pub(crate) fn read_piece(chunk: &Chunk, head: Option<&MeshHead>, bytes: &[u8]) -
         ChunkType::SPLITS => {
             let head = head.ok_or_else(|| chunk.damage("the base of its mesh is not known"))?;
             let at = (chunk.first, chunk.first_face);
-            let block = splits::read(head, at, chunk.count as usize, chunk.raw, bytes).ok_or_else(damaged)?;
-            Ok(Piece::Splits(Box::new(block)))
+            let mut state = Sequel::new(head, head.start.take().ok_or_else(damaged)?);
+            let block = codec::read(head, &mut state, true, at, (chunk.count as usize, chunk.raw), bytes);
+            head.start.give(state);
+            Ok(Piece::Splits(Box::new(block.ok_or_else(damaged)?)))
         }
         ChunkType::SEQUEL => Ok(Piece::Sequel(bytes.to_vec())),
         ChunkType::BOUNDS => {

@@ -4,7 +4,7 @@
 //! begins the edge there; [`NONE`] for none. A link is the half across, seen from the vertex where the face ends the edge.
 
 use super::places;
-use super::plan::Curve;
+use super::plan::{self, Label};
 use crate::aif::NONE;
 use crate::progressive::links::link_faces;
 use crate::progressive::{ProgressiveMesh, SplitCode};
@@ -32,13 +32,17 @@ pub(super) fn cut(h: u32) -> u32 {
 /// No error yet.
 pub(super) const NO_LEVEL: u16 = u16::MAX;
 
-/// What is known of a vertex, beside where it is.
+/// What is known of a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Vertex {
+    /// Where it is.
+    pub(super) place: [f64; 3],
+    /// Its place in the order of descent.
+    pub(super) label: Label,
     /// The half with which its ring begins; [`NONE`] for a vertex without faces.
     at: u32,
-    /// Where on the curve it was made.
-    pub(super) key: u32,
+    /// Splits of it to come (writer).
+    pub(super) to_come: u32,
     /// Faces around it.
     pub(super) valence: u16,
     /// The level of the last error of a split of it, or of that which made it.
@@ -52,8 +56,10 @@ pub(super) struct Vertex {
 pub(super) struct Walk {
     faces: Vec<Face>,
     pub(super) vertices: Vec<Vertex>,
-    pub(super) places: Vec<[f64; 3]>,
-    curve: Curve,
+    /// Faces and vertices of the base.
+    base: (usize, usize),
+    /// Those that are no longer as in the base, perhaps several times.
+    changed: (Vec<u32>, Vec<u32>),
 }
 
 /// The edges around a vertex, in turn.
@@ -138,11 +144,17 @@ impl Walk {
             }
         }
         let links = link_faces(&corners, n0);
-        let curve = Curve::new(pm);
-        let places: Vec<[f64; 3]> = (0..n0).map(|i| places::point(&pm.base_positions, i)).collect();
-        let lone =
-            |&p: &[f64; 3]| Vertex { at: NONE, key: curve.at(p), valence: 0, level: NO_LEVEL, visit: 0 };
-        let mut vertices: Vec<Vertex> = places.iter().map(lone).collect();
+        let labels = plan::labels(&plan::base_order(pm));
+        let lone = |(i, &label): (usize, &Label)| Vertex {
+            place: places::point(&pm.base_positions, i),
+            label,
+            at: NONE,
+            to_come: 0,
+            valence: 0,
+            level: NO_LEVEL,
+            visit: 0,
+        };
+        let mut vertices: Vec<Vertex> = labels.iter().enumerate().map(lone).collect();
         for (f, corners) in (0u32..).zip(&corners) {
             for (k, &v) in (0u32..).zip(corners) {
                 let v = &mut vertices[v as usize];
@@ -157,14 +169,35 @@ impl Walk {
         let pack = |l: u32| if l == NONE { NONE } else { l & !7 | (l & 3) << 1 | !l >> 2 & 1 };
         Some(Walk {
             faces: faces.map(|(c, l)| [c[0], c[1], c[2], 0, pack(l[0]), pack(l[1]), pack(l[2]), 0]).collect(),
+            base: (corners.len(), vertices.len()),
+            changed: Default::default(),
             vertices,
-            places,
-            curve,
         })
     }
 
-    pub(super) fn face_count(&self) -> usize {
-        self.faces.len()
+    /// Goes back to the base, which `base` is at. Takes time for what was done since, not for all of the base.
+    pub(super) fn reset(&mut self, base: &Walk) {
+        self.faces.truncate(self.base.0);
+        self.vertices.truncate(self.base.1);
+        let (faces, vertices) = &mut self.changed;
+        faces.drain(..).for_each(|f| self.faces[f as usize] = base.faces[f as usize]);
+        vertices.drain(..).for_each(|v| self.vertices[v as usize] = base.vertices[v as usize]);
+    }
+
+    /// Notes that vertex `v` is about to change.
+    #[inline]
+    pub(super) fn changes(&mut self, v: u32) {
+        if (v as usize) < self.base.1 {
+            self.changed.1.push(v);
+        }
+    }
+
+    #[inline]
+    fn face_mut(&mut self, f: u32) -> &mut Face {
+        if (f as usize) < self.base.0 {
+            self.changed.0.push(f);
+        }
+        &mut self.faces[f as usize]
     }
 
     /// The same edge in the face across.
@@ -255,7 +288,7 @@ impl Walk {
             if entry == NONE {
                 break;
             }
-            self.faces[(entry >> 3) as usize][NEAR[(entry & 7) as usize] as usize] = u;
+            self.face_mut(entry >> 3)[NEAR[(entry & 7) as usize] as usize] = u;
             entry = self.across(turn(entry));
         }
         let (l, old, mut at_u) = self.insert(code.left().1, [v, u, tips[0]], left);
@@ -268,16 +301,18 @@ impl Walk {
             at_u = turn(at_u);
         }
         let valence = (count + 1 + two as usize).min(u16::MAX as usize) as u16;
-        self.vertices.push(Vertex { at: at_u, key: self.curve.at(place), valence, level, visit: 0 });
+        self.changes(v);
+        let label = self.vertices[v as usize].label.split();
+        self.vertices.push(Vertex { place, label, at: at_u, to_come: 0, valence, level, visit: 0 });
         let vertex = &mut self.vertices[v as usize];
         (vertex.at, vertex.level) = (old, level);
         vertex.valence = vertex.valence.saturating_add(1 + two as u16).saturating_sub(count as u16);
         for t in &tips[..1 + two as usize] {
+            self.changes(*t);
             if let Some(t) = self.vertices.get_mut(*t as usize) {
                 t.valence = t.valence.saturating_add(1);
             }
         }
-        self.places.push(place);
         tips
     }
 
@@ -303,8 +338,8 @@ impl Walk {
     /// Links two halves, both seen from the same vertex.
     #[inline]
     fn connect(&mut self, x: u32, y: u32) {
-        self.faces[(x >> 3) as usize][4 + (x >> 1 & 3) as usize] = y ^ x & 1;
-        self.faces[(y >> 3) as usize][4 + (y >> 1 & 3) as usize] = x ^ y & 1;
+        self.face_mut(x >> 3)[4 + (x >> 1 & 3) as usize] = y ^ x & 1;
+        self.face_mut(y >> 3)[4 + (y >> 1 & 3) as usize] = x ^ y & 1;
     }
 }
 

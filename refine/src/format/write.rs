@@ -2,13 +2,14 @@
 
 use super::base::{self, MeshHead};
 use super::bounds;
+use super::codec::{self, Sequel, Sources, Start};
 use super::container::{Chunk, ChunkType, Directory, EXPANSION};
 use super::input_order;
 use super::lattice;
 use super::pages;
-use super::plan::{self, Piece, Plan};
-use super::sequel::{self, Sequel};
-use super::splits::{self, Counts, Fans};
+use super::places;
+use super::plan::{Layout, Piece, Plan};
+use super::splits::{self, Counts};
 use crate::hierarchy::{Bounds, Forest};
 use crate::progressive::{Damage, ProgressiveMesh, RowsOf};
 use std::sync::Arc;
@@ -21,12 +22,13 @@ pub struct EncodeOptions {
     pub any_order: bool,
     /// Move all vertices onto a grid of `2^bits` cells along the longest side of each mesh's box; 2..=30. Smaller files, but lossy.
     pub quantize: Option<u32>,
-    /// Every chunk can be read alone, whatever else was read. Files are larger: by some 22 bits a split for connectivity, and 13 to 18 for places.
-    pub alone: bool,
-    /// Beside every chunk, what refining out of core takes ([`crate::paged`]): links of the vertex hierarchy. Only with [`EncodeOptions::alone`], of meshes with bounds
+    /// Chunks follow each other: none can be read before all that stand before it. Files are smaller.
+    pub sequential: bool,
+    /// Beside every chunk, what refining out of core takes ([`crate::paged`]): links of the vertex hierarchy. Only without [`EncodeOptions::sequential`], of meshes with bounds
     /// ([`ProgressiveMesh::bounds`]).
     pub pages: bool,
-    /// Splits of a chunk, aimed at; 8192 if not said. Smaller ones make larger files, of which views fetch less.
+    /// Splits of a chunk, at most but for those of a single vertex; by default 16,384, and 8,192 of chunks that follow each other. With smaller ones less has to be fetched for a region,
+    /// and more in all.
     pub chunk: Option<u32>,
 }
 
@@ -37,16 +39,22 @@ impl EncodeOptions {
         self
     }
 
-    /// Sets [`EncodeOptions::alone`].
+    /// Every chunk can be read alone, which is the default: the opposite of [`EncodeOptions::sequential`].
     pub fn with_alone(mut self, on: bool) -> Self {
-        self.alone = on;
+        self.sequential = !on;
         self
     }
 
-    /// Sets [`EncodeOptions::pages`], and with it [`EncodeOptions::alone`].
+    /// Sets [`EncodeOptions::sequential`].
+    pub fn with_sequential(mut self, on: bool) -> Self {
+        self.sequential = on;
+        self
+    }
+
+    /// Sets [`EncodeOptions::pages`], and takes [`EncodeOptions::sequential`] back.
     pub fn with_pages(mut self, on: bool) -> Self {
         self.pages = on;
-        self.alone |= on;
+        self.sequential &= !on;
         self
     }
 
@@ -140,7 +148,7 @@ pub fn encode(
         if pm.bounds.as_ref().is_some_and(|b| b.len() != pm.splits.len()) {
             return Err(EncodeError::Inconsistent(m));
         }
-        if options.pages && options.alone && pm.bounds.is_none() {
+        if options.pages && !options.sequential && pm.bounds.is_none() {
             return Err(EncodeError::NoBounds(m));
         }
         let places: Vec<u32> =
@@ -202,7 +210,9 @@ fn encode_mesh(
         (quantisation_error, flat_faces) = (error, lattice::flat_faces(pm)?);
     }
     let source = quantised.as_ref().unwrap_or(source);
-    let plan = Plan::new(source, options.alone, options.chunk.map_or(plan::CHUNK, |c| c as usize))?;
+    let layout =
+        if options.sequential { Layout::sequential(options.chunk) } else { Layout::alone(options.chunk) };
+    let plan = Plan::new(source, layout)?;
     let mut pm = source.reordered(&plan.order).ok()?;
     let tips = input_order::tips(&pm);
     input_order::turn(&mut pm, &tips, true);
@@ -224,10 +234,10 @@ fn encode_mesh(
         single: pm.splits.code.iter().zip(0..).filter(|(c, _)| !c.two_faces()).map(|(_, i)| i).collect(),
         quantisation_error,
         flat_faces,
+        start: Start::new(&pm)?,
     };
     let mut base = part(ChunkType::BASE, true, m, base::raw_bytes(&head), base::write(&head, &mut pm)?);
     base.chunk.count = head.base_vertices;
-    let fans = if options.alone { Some(Fans::new(&pm).ok()?) } else { None };
     let bounds = match &pm.bounds {
         Some(b) if quantisation_error > 0.0 => Some(Arc::new(b.after_moving(&pm, quantisation_error).ok()?)),
         b => b.clone(),
@@ -248,23 +258,27 @@ fn encode_mesh(
         p.turn = sum / piece.count.max(1) as f64;
         p
     };
-    let jobs: Vec<_> = plan.pieces.iter().zip(starts.windows(2)).collect();
-    let splits: Option<Vec<Part>> = match &fans {
-        Some(fans) => {
-            let one = |(piece, ends): (&Piece, &[Counts])| {
-                let (bytes, _) = splits::write(&head, &pm, fans, ends[0], piece.count)?;
-                Some(pack(piece, ends, ChunkType::SPLITS, bytes))
-            };
-            super::each(jobs, one).into_iter().collect()
-        }
-        None => {
-            let mut state = Sequel::new(&head, &pm)?;
-            let one = |(piece, ends): (&Piece, &[Counts])| {
-                let (bytes, _) = sequel::write(&head, &pm, &mut state, ends[0], piece.count)?;
-                Some(pack(piece, ends, ChunkType::SEQUEL, bytes))
-            };
-            jobs.into_iter().map(one).collect()
-        }
+    let jobs = plan.pieces.iter().zip(starts.windows(2));
+    let splits: Option<Vec<Part>> = if options.sequential {
+        let mut state = Sequel::new(&head, head.start.take()?);
+        let one = |(piece, ends): (&Piece, &[Counts])| {
+            let bytes = codec::write(&head, &pm, &mut state, (ends[0], piece.count), None)?;
+            Some(pack(piece, ends, ChunkType::SEQUEL, bytes))
+        };
+        jobs.map(one).collect()
+    } else {
+        let on = pm.dependencies();
+        let firsts: Vec<u32> = starts.iter().map(|c| c.split as u32).collect();
+        let last = last_places(&pm);
+        let mut sources = Sources::new(&head, &on, &firsts, &last);
+        let one = |(piece, ends): (&Piece, &[Counts])| {
+            let mut state = Sequel::new(&head, head.start.take()?);
+            sources.find(ends[0].split..ends[1].split);
+            let bytes = codec::write(&head, &pm, &mut state, (ends[0], piece.count), Some(&mut sources))?;
+            head.start.give(state);
+            Some(pack(piece, ends, ChunkType::SPLITS, bytes))
+        };
+        jobs.map(one).collect()
     };
     let order = match &pm.order {
         Some(order) if !options.any_order => {
@@ -274,7 +288,7 @@ fn encode_mesh(
         }
         _ => None,
     };
-    let paged = bounds.as_ref().filter(|_| options.pages && options.alone);
+    let paged = bounds.as_ref().filter(|_| options.pages && !options.sequential);
     let paged = paged.map(|b| (b, Forest::new(&pm)));
     let page = match &paged {
         Some((bounds, forest)) => {
@@ -321,6 +335,18 @@ fn bounds_of(splits: &Part, bounds: &Bounds) -> Option<Part> {
     p.chunk = Chunk { first, count, band, subtree, ..p.chunk };
     p.chunk.error = (first..first + count).map(|i| bounds.error(i as usize) as f32).fold(0.0, f32::max);
     Some(p)
+}
+
+/// Where the vertices that splits make are at full detail.
+fn last_places(pm: &ProgressiveMesh) -> Vec<[f64; 3]> {
+    let mut places: Vec<_> = (0..pm.splits.len()).map(|i| places::point(&pm.new_positions, i)).collect();
+    let moving = pm.splits.code.iter().zip(&pm.splits.vertex).filter(|(c, _)| c.moves());
+    for ((_, &v), k) in moving.zip(0..) {
+        if let Some(p) = (v as usize).checked_sub(pm.base_vertices()).and_then(|i| places.get_mut(i)) {
+            *p = places::point(&pm.moved_positions, k);
+        }
+    }
+    places
 }
 
 /// Where the arrays stand at the start of every piece, and at the end.

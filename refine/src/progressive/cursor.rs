@@ -286,18 +286,6 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
         result.map(|()| descent)
     }
 
-    /// Appends the edges around the vertex of the next split, from the left cut over the faces that go to the new vertex and on around (or to the
-    /// border): each as `cut << 1 | starts`, where the cut is named as in [`super::Splits`], and `starts` says that its face begins the edge
-    /// at the vertex. O(valence).
-    pub(crate) fn fan(&self, out: &mut Vec<u32>) -> Result<(), Damage> {
-        let i = self.position;
-        let splits = &self.source.splits;
-        let (Some(&cut), Some(code)) = (splits.left.get(i), splits.code.get(i)) else {
-            return Err(Damage::Fan(i));
-        };
-        self.fans.around(i, cut, code, out)
-    }
-
     /// Applies the next split; false at full detail. O(valence).
     ///
     /// Errors: damage; nothing has changed then.

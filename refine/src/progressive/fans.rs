@@ -96,35 +96,6 @@ impl Fans {
         if two { Err(Damage::Fan(i)) } else { Ok(gap) }
     }
 
-    /// Appends the edges around the vertex of split `i`, from its left cut on, each as `cut << 1 | starts`. O(valence).
-    pub(crate) fn around(
-        &self,
-        i: usize,
-        cut: u32,
-        code: &SplitCode,
-        out: &mut Vec<u32>,
-    ) -> Result<(), Damage> {
-        if cut >> 2 >= self.corners.len() as u32 || cut & 3 == 3 {
-            return Err(Damage::Reference { what: "split", at: i, to: cut });
-        }
-        let named = Half { face: cut >> 2, edge: cut & 3, starts: code.left_starts() };
-        let mut push = |h: Half| out.push(h.code() << 1 | h.starts as u32);
-        push(named);
-        let mut entry = if code.left_inner() { Some(named) } else { self.across(named) };
-        // A fan has no more faces than the mesh.
-        for _ in 0..self.corners.len() {
-            let Some(h) = entry else { break };
-            let exit = h.turn();
-            entry = self.across(exit);
-            let later = entry.filter(|e| e.face > exit.face).unwrap_or(exit);
-            if later.code() == cut {
-                break;
-            }
-            push(later);
-        }
-        Ok(())
-    }
-
     /// Gives the corners of `count` faces at a vertex, from `first` on, the wedges that `map` says; `seen` is told every index-buffer entry.
     #[inline]
     pub(crate) fn hand_over(

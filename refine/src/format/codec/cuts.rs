@@ -1,7 +1,6 @@
 //! Where a split opens the ring of its vertex.
 
 use super::super::coder::{Coder, Nibble, Number};
-use super::super::splits::Source;
 use super::super::walk::{Cut, cut, turn};
 use super::{Codec, valence_class};
 use crate::aif::NONE;
@@ -10,10 +9,21 @@ use crate::progressive::SplitCode;
 /// Bits of a code that the mesh and the cuts tell.
 const TOLD: u16 =
     SplitCode::TWO_FACES | SplitCode::MOVES | SplitCode::L_INNER | SplitCode::L_STARTS | SplitCode::R_INNER;
+/// Those that say how corners lie.
+const ARRANGEMENT: u16 = 0x3F;
 /// Beside the code: the ring runs the other way.
 const TURNED: u32 = 1 << 16;
 /// Beside the code: the cuts are named, not counted.
 const NAMED: u32 = 1 << 17;
+
+/// The split that a writer wants, in the numbers of its mesh.
+#[derive(Clone, Copy, Debug)]
+pub(in super::super) struct Wanted {
+    pub(in super::super) vertex: u32,
+    pub(in super::super) left: u32,
+    pub(in super::super) right: u32,
+    pub(in super::super) code: SplitCode,
+}
 
 /// A split's cuts, as places in the ring.
 #[derive(Clone, Copy, Debug)]
@@ -31,20 +41,19 @@ impl Codec<'_> {
         c: &mut C,
         (v, state): (u32, u8),
         two: bool,
-        source: &Option<Source<'_>>,
+        wanted: Option<Wanted>,
     ) -> Option<(SplitCode, Cuts)> {
         let start = Some(self.walk.start(v)).filter(|&h| h != NONE)?;
         self.walk.ring(start, &mut self.ring)?;
         let mut want = None;
         let (mut rest, mut moves) = (0, false);
-        if let Some(s) = source {
-            let (splits, i) = (&s.pm.splits, s.at.split);
-            let code = splits.code[i];
-            (rest, moves) = ((code.0 & !TOLD) as u32, code.moves());
-            want = self.find(two, splits.left[i], splits.right[i], code);
+        let told = if self.preparing { !ARRANGEMENT } else { TOLD };
+        if let Some(w) = wanted {
+            (rest, moves) = ((w.code.0 & !told) as u32, w.code.moves());
+            want = self.find(two, w);
             if want.is_none() {
                 self.walk.ring(turn(start), &mut self.ring)?;
-                want = self.find(two, splits.left[i], splits.right[i], code);
+                want = self.find(two, w);
                 rest |= if want.is_some() { TURNED } else { NAMED };
             }
         }
@@ -54,13 +63,12 @@ impl Codec<'_> {
             rest = u32::try_from(c.number(&mut self.m.rest, rest as u64)).ok()?;
         }
         self.rest = rest;
-        let told = if two { SplitCode::TWO_FACES } else { 0 };
-        let mut code = rest as u16 & !TOLD | told;
-        if c.bit(&mut self.m.moves, moves) {
+        let mut code = rest as u16 & !told | if two { SplitCode::TWO_FACES } else { 0 };
+        if !self.preparing && c.bit(&mut self.m.moves, moves) {
             code |= SplitCode::MOVES;
         }
         let cuts = if rest & NAMED != 0 {
-            self.named(c, v, two, source)?
+            self.named(c, v, two, wanted)?
         } else {
             if C::READS && rest & TURNED != 0 {
                 self.walk.ring(turn(start), &mut self.ring)?;
@@ -80,7 +88,8 @@ impl Codec<'_> {
     }
 
     /// Where in the ring the writer's cuts are.
-    fn find(&self, two: bool, left: u32, right: u32, code: SplitCode) -> Option<(usize, usize)> {
+    fn find(&self, two: bool, wanted: Wanted) -> Option<(usize, usize)> {
+        let Wanted { left, right, code, .. } = wanted;
         let faces = self.ring.faces();
         let left = (left >> 2) << 3 | (left & 3) << 1 | code.left_starts() as u32;
         let first =
@@ -120,12 +129,8 @@ impl Codec<'_> {
     }
 
     /// Cuts by the numbers of faces: where the vertex has several fans, or the cuts are not named by the later face.
-    fn named<C: Coder>(&mut self, c: &mut C, v: u32, two: bool, source: &Option<Source<'_>>) -> Option<Cuts> {
-        let (mut left, mut right, mut code) = (0, 0, SplitCode(0));
-        if let Some(s) = source {
-            let i = s.at.split;
-            (left, right, code) = (s.pm.splits.left[i], s.pm.splits.right[i], s.pm.splits.code[i]);
-        }
+    fn named<C: Coder>(&mut self, c: &mut C, v: u32, two: bool, wanted: Option<Wanted>) -> Option<Cuts> {
+        let (left, mut right, mut code) = wanted.map_or_else(Default::default, |w| (w.left, w.right, w.code));
         let left = u32::try_from(c.number(&mut self.m.named[0], left as u64)).ok()?;
         let inner = c.bit(&mut self.m.inner[0], code.left_inner());
         let starts = c.bit(&mut self.m.inner[1], code.left_starts());
@@ -150,7 +155,7 @@ impl Codec<'_> {
                 | flags(inner, SplitCode::L_INNER)
                 | flags(starts, SplitCode::L_STARTS),
         );
-        let (first, count) = self.find(two, left, right, code)?;
+        let (first, count) = self.find(two, Wanted { vertex: v, left, right, code })?;
         Some(Cuts { left: self.ring.left(first), right: self.ring.right(first, count), first, count })
     }
 }

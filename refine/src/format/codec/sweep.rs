@@ -1,7 +1,6 @@
 //! Which vertex is split next: sweeps over the chunk's vertices, in which each is asked whether its turn has come.
 
 use super::super::coder::Coder;
-use super::super::splits::{CONNECTIVITY, ERRORS, STREAMS};
 use super::{Codec, valence_class};
 
 /// What a vertex did when the sweep last came by.
@@ -16,56 +15,50 @@ const DONE: u8 = 7;
 pub(super) const TOUCHED: u8 = 8;
 
 impl Codec<'_> {
-    /// Codes the chunk's roots; a writer gives its splits.
-    pub(super) fn begin<C: Coder>(
-        &mut self,
-        c: &mut [C; STREAMS],
-        of: &[u32],
-        levels: [u16; 2],
-        count: usize,
-    ) -> Option<()> {
-        self.levels[0] = c[ERRORS].plain(16, levels[0] as u32) as u16;
-        self.levels[1] = c[ERRORS].plain(16, levels[1] as u32) as u16;
-        let c = &mut c[CONNECTIVITY];
-        let first = self.first_vertex as u32;
+    /// Codes the least and the largest level of the chunk.
+    pub(super) fn levels<C: Coder>(&mut self, c: &mut C, levels: [u16; 2]) {
+        self.levels = levels.map(|l| c.plain(16, l as u32) as u16);
+    }
+
+    /// Codes the roots of `count` splits that follow; a writer gives their vertices.
+    pub(super) fn begin<C: Coder>(&mut self, c: &mut C, of: &[u32], count: usize) -> Option<()> {
+        let first = self.walk.vertices.len() as u32;
         let mut roots: Vec<u32> = of.iter().copied().filter(|&v| v < first).collect();
         roots.sort_unstable();
+        for v in of.iter().filter(|&&v| v < first) {
+            self.walk.changes(*v);
+            self.walk.vertices[*v as usize].to_come += 1;
+        }
+        self.to_come.clear();
+        self.to_come.resize(of.len(), 0);
+        for v in of.iter().filter(|&&v| v >= first) {
+            *self.to_come.get_mut((v - first) as usize)? += 1;
+        }
         roots.dedup();
         let number = c.number(&mut self.m.roots, roots.len() as u64);
         if number > count as u64 {
             return None;
         }
+        self.pass.clear();
+        self.list.clear();
+        self.moved = true;
+        self.begins = first as usize;
         let mut next = 0u64;
         for k in 0..number as usize {
             let gap = c.number(&mut self.m.root, roots.get(k).map_or(0, |&r| r as u64 - next));
             let v = u32::try_from(next.checked_add(gap)?).ok().filter(|&v| v < first)?;
             next = v as u64 + 1;
+            self.walk.changes(v);
             self.walk.vertices[v as usize].visit = ROOT;
             self.pass.push(v);
             if c.spent() {
                 return None;
             }
         }
-        // Along the curve, so that what is near is near in memory too; the first on top.
+        // In the order of descent, the first on top.
         let vertices = &self.walk.vertices;
-        self.pass.sort_unstable_by_key(|&v| std::cmp::Reverse((vertices[v as usize].key, v)));
-        if !C::READS {
-            self.to_come = vec![0; of.len() + roots.len()];
-            self.roots = roots;
-            for &v in of {
-                *self.left(v)? += 1;
-            }
-        }
+        self.pass.sort_unstable_by_key(|&v| std::cmp::Reverse((vertices[v as usize].label.key(), v)));
         Some(())
-    }
-
-    /// The splits of a vertex to come (writer).
-    pub(super) fn left(&mut self, v: u32) -> Option<&mut u16> {
-        let at = match (v as usize).checked_sub(self.first_vertex) {
-            Some(new) => self.roots.len() + new,
-            None => self.roots.binary_search(&v).ok()?,
-        };
-        self.to_come.get_mut(at)
     }
 
     /// The vertex of the next split, by the sweep, and what it did last.
@@ -88,7 +81,9 @@ impl Codec<'_> {
                 continue;
             }
             let level = vertex.level.min(self.levels[1]).saturating_sub(self.levels[0]);
+            // Of the splits that only prepare no level is known.
             let level = match level {
+                _ if self.preparing => 6,
                 0 => 0,
                 1 | 2 => 1,
                 3 | 4 => 2,
@@ -101,13 +96,12 @@ impl Codec<'_> {
                 vertex.visit = SPLIT;
                 self.moved = true;
                 if !C::READS {
-                    *self.left(v)? -= 1;
+                    vertex.to_come = vertex.to_come.checked_sub(1)?;
                 }
                 return Some((v, state));
             }
-            let more = if C::READS { 0 } else { *self.left(v)? };
-            let vertex = &mut self.walk.vertices[v as usize];
-            if state >= WAITED || !c.bit(&mut self.m.done[state as usize][level], more == 0) {
+            let last = vertex.to_come == 0;
+            if state >= WAITED || !c.bit(&mut self.m.done[state as usize][level], last) {
                 vertex.visit = if state < WAITED { WAITED } else { (state + 1).min(MOST) };
                 self.list.push(v);
             } else {

@@ -1,12 +1,17 @@
-//! Chunks of splits that are read after those before: references as ranks in the rings of the mesh as it is then, positions expected amid their
-//! neighbours.
+//! Chunks of splits: references as ranks in the rings of a mesh, positions expected amid their neighbours.
 //!
-//! Both sides do the splits of the chunk on a [`Walk`]. FORMAT.md, "SPLS", has the rules.
+//! Both sides do the splits of the chunk on a [`Walk`]: on the mesh that all chunks before make, or, so that the chunk can be read alone, on the least mesh in which
+//! its splits can be done ([`context`]). FORMAT.md, "SPLS" and "SPLT", has the rules.
 
+mod context;
 mod cuts;
 mod expect;
 mod sweep;
 
+use self::context::Known;
+pub(super) use self::context::{Sources, Start};
+use self::cuts::Cuts;
+pub(super) use self::cuts::Wanted;
 use self::sweep::{NEW, TOUCHED};
 use super::base::MeshHead;
 use super::coder::{Bit, Coder, Decoder, Encoder, Nibble, Number, put_varint, take_varint};
@@ -14,11 +19,11 @@ use super::extras::Extras;
 use super::places;
 use super::residual::Residuals;
 use super::splits::{
-    CONNECTIVITY, Counts, ERROR_SHIFT, ERRORS, PLACES, STREAMS, Sizes, Source, SplitBlock, error_level,
+    CONNECTIVITY, Counts, ERROR_SHIFT, ERRORS, PLACES, STREAMS, Source, SplitBlock, error_level,
 };
 use super::walk::{Cut, NO_LEVEL, Ring, Walk, cut};
 use crate::aif::NONE;
-use crate::progressive::ProgressiveMesh;
+use crate::progressive::{ProgressiveMesh, SplitCode};
 
 /// Valences told apart.
 const VALENCES: usize = 10;
@@ -32,8 +37,8 @@ fn valence_class(n: usize) -> usize {
 struct Models {
     roots: Number,
     root: Number,
-    split: [[[Bit; 6]; VALENCES]; 5],
-    done: [[Bit; 6]; 3],
+    split: [[[Bit; 7]; VALENCES]; 5],
+    done: [[Bit; 7]; 3],
     rest_same: Bit,
     rest: Number,
     moves: Bit,
@@ -44,9 +49,10 @@ struct Models {
     far: Number,
     error: [Nibble; 12],
     error_far: Number,
+    context: context::Models,
 }
 
-/// What goes on from chunk to chunk: the mesh, and what was learned about symbols.
+/// What goes on from chunk to chunk where they follow each other: the mesh, and what was learned about symbols.
 #[derive(Clone, Debug)]
 pub(super) struct Sequel {
     walk: Walk,
@@ -55,13 +61,9 @@ pub(super) struct Sequel {
 }
 
 impl Sequel {
-    /// At the base of `pm`. `None` if that contradicts itself.
-    pub(super) fn new(head: &MeshHead, pm: &ProgressiveMesh) -> Option<Self> {
-        Some(Sequel {
-            walk: Walk::new(pm)?,
-            residuals: Residuals::new(head.double, &head.lattices),
-            m: Box::default(),
-        })
+    /// Before the first split.
+    pub(super) fn new(head: &MeshHead, walk: Walk) -> Self {
+        Sequel { walk, residuals: Residuals::new(head.double, &head.lattices), m: Box::default() }
     }
 }
 
@@ -78,21 +80,26 @@ struct Codec<'a> {
     list: Vec<u32>,
     /// Something was split in this sweep.
     moved: bool,
+    /// The first vertex made since the sweeps began, and how often those made are to be split (writer).
+    begins: usize,
+    to_come: Vec<u32>,
+    /// Splits that only prepare for those of the chunk.
+    preparing: bool,
     rest: u32,
     /// The least and the largest level.
     levels: [u16; 2],
-    /// How many splits of each vertex are to come, roots first (writer only).
-    to_come: Vec<u16>,
-    roots: Vec<u32>,
-    first_vertex: usize,
+    /// The next split.
+    split: u32,
+    /// What is known of older splits, in a chunk that is read alone.
+    known: Option<Known>,
 }
 
 impl<'a> Codec<'a> {
-    fn new(head: &'a MeshHead, state: &'a mut Sequel, first: Counts) -> Self {
+    fn new(head: &'a MeshHead, state: &'a mut Sequel, first: Counts, alone: bool) -> Self {
         let Sequel { walk, residuals, m } = state;
         Codec {
             head,
-            first_vertex: walk.vertices.len(),
+            known: alone.then(|| Known::new(head, first)),
             walk,
             residuals,
             extras: Extras::new(head, first.wedge),
@@ -101,10 +108,12 @@ impl<'a> Codec<'a> {
             pass: Vec::new(),
             list: Vec::new(),
             moved: true,
+            begins: 0,
+            to_come: Vec::new(),
+            preparing: false,
             rest: 0,
             levels: [0; 2],
-            to_come: Vec::new(),
-            roots: Vec::new(),
+            split: first.split as u32,
         }
     }
 
@@ -115,13 +124,12 @@ impl<'a> Codec<'a> {
         source: &mut Option<Source<'_>>,
         out: &mut SplitBlock,
     ) -> Option<()> {
-        let split = (self.walk.vertices.len() - self.head.base_vertices as usize) as u32;
-        let wanted = source.as_ref().map_or(NONE, |s| s.pm.splits.vertex[s.at.split]);
-        let (v, state) = self.sweep(&mut c[CONNECTIVITY], wanted)?;
+        let wanted = source.as_ref().map(|s| s.wanted());
+        let (v, state) = self.sweep(&mut c[CONNECTIVITY], wanted.map_or(NONE, |w| w.vertex))?;
         let level = source.as_ref().map_or(0, |s| error_level(s.pm.splits.error[s.at.split]) as u16);
         let level = self.level(&mut c[ERRORS], self.walk.vertices[v as usize].level, level)?;
-        let two = !self.head.is_single(split);
-        let (code, cuts) = self.cuts(&mut c[CONNECTIVITY], (v, state), two, source)?;
+        let two = !self.head.is_single(self.split);
+        let (code, cuts) = self.cuts(&mut c[CONNECTIVITY], (v, state), two, wanted)?;
         // Places.
         let guess = self.guess(v, &cuts, code.moves());
         let place = source.as_ref().map_or([0.0; 3], |s| places::point(&s.pm.new_positions, s.at.split));
@@ -133,27 +141,39 @@ impl<'a> Codec<'a> {
             moved = Some(self.residuals.code(&mut c[PLACES], 2, &guess, to));
         }
         if C::READS {
-            let name = |c: Cut| cut(c.name().0);
-            out.splits.vertex.push(v);
-            out.splits.left.push(name(cuts.left));
-            out.splits.right.push(if two { name(cuts.right) } else { NONE });
+            let name = |c: Cut| {
+                let c = cut(c.name().0);
+                self.known.as_ref().map_or(Some(c), |k| k.cut(self.head, c))
+            };
+            out.splits.vertex.push(self.known.as_ref().map_or(v, |k| k.vertex(v)));
+            out.splits.left.push(name(cuts.left)?);
+            out.splits.right.push(if two { name(cuts.right)? } else { NONE });
             out.splits.code.push(code);
             out.splits.error.push(f32::from_bits((level as u32) << ERROR_SHIFT));
             places::push(&mut out.new_positions, place);
             moved.iter().for_each(|&to| places::push(&mut out.moved_positions, to));
         }
-        let u = self.walk.vertices.len() as u32;
-        let tips = self.walk.split(v, (cuts.left, cuts.right), cuts.count, code, (place, level));
-        for tip in tips.into_iter().take(1 + two as usize) {
-            self.walk.vertices[tip as usize].visit |= TOUCHED;
-        }
+        self.apply(v, &cuts, code, (place, level));
         if let Some(to) = moved {
-            self.walk.places[v as usize] = to;
+            self.walk.vertices[v as usize].place = to;
         }
-        self.walk.vertices[u as usize].visit = NEW;
-        self.pass.extend([u, v]);
+        self.split += 1;
         let [.., attributes, faces] = c;
         self.extras.code((attributes, faces), (v, code), source, out)
+    }
+
+    /// Does a split.
+    #[inline]
+    fn apply(&mut self, v: u32, cuts: &Cuts, code: SplitCode, made: ([f64; 3], u16)) {
+        let u = self.walk.vertices.len() as u32;
+        let tips = self.walk.split(v, (cuts.left, cuts.right), cuts.count, code, made);
+        for tip in tips.into_iter().take(1 + code.two_faces() as usize) {
+            self.walk.vertices[tip as usize].visit |= TOUCHED;
+        }
+        let new = &mut self.walk.vertices[u as usize];
+        new.visit = NEW;
+        new.to_come = self.to_come.get(u as usize - self.begins).copied().unwrap_or(0);
+        self.pass.extend([u, v]);
     }
 
     /// A level of error: mostly a little below that of the split before at the vertex.
@@ -171,51 +191,59 @@ impl<'a> Codec<'a> {
     }
 }
 
-/// The chunk of `count` splits from `first` on, which `walk` stands before; with the bytes of each of its streams.
+/// Writes the chunk of `count` splits from `first` on, before which `state` stands; if it is to be read alone, at the base, and given what it needs.
 pub(super) fn write(
     head: &MeshHead,
     pm: &ProgressiveMesh,
     state: &mut Sequel,
-    first: Counts,
-    count: usize,
-) -> Option<(Vec<u8>, Sizes)> {
+    (first, count): (Counts, usize),
+    mut sources: Option<&mut Sources<'_>>,
+) -> Option<Vec<u8>> {
     let mut streams: [Encoder; STREAMS] = Default::default();
     let range = first.split..first.split + count;
     let levels = pm.splits.error[range.clone()].iter().map(|&e| error_level(e) as u16);
     let levels = levels.fold([NO_LEVEL, 0], |[a, b], l| [a.min(l), b.max(l)]);
-    let mut codec = Codec::new(head, state, first);
-    codec.begin(&mut streams, &pm.splits.vertex[range], levels, count)?;
-    let mut source = Some(Source { pm, fans: None, at: first });
+    let mut codec = Codec::new(head, state, first, sources.is_some());
+    if let Some(sources) = sources.as_deref_mut() {
+        codec.context(&mut streams, pm, Some(sources), u64::MAX)?;
+    }
+    let numbers = sources.as_deref();
+    let vertex = |v: u32| numbers.map_or(v, |n| n.vertex(v));
+    let of: Vec<u32> = pm.splits.vertex[range].iter().map(|&v| vertex(v)).collect();
+    codec.levels(&mut streams[ERRORS], levels);
+    codec.begin(&mut streams[CONNECTIVITY], &of, count)?;
+    let mut source = Some(Source { pm, numbers, at: first });
     let mut nothing = SplitBlock::default();
     for _ in 0..count {
         codec.split(&mut streams, &mut source, &mut nothing)?;
     }
     let mut out = Vec::new();
     put_varint(&mut out, first.wedge as u64);
-    let mut sizes = Sizes::default();
-    for (stream, size) in streams.into_iter().zip(&mut sizes) {
+    for stream in streams {
         let mut bytes = Vec::new();
         stream.finish(&mut bytes);
         put_varint(&mut out, bytes.len() as u64);
         out.extend_from_slice(&bytes);
-        *size = bytes.len() as u64;
     }
-    Some((out, sizes))
+    // A byte for every split of the context, at least.
+    let least = codec.known.map_or(0, |k| k.splits());
+    out.resize(out.len().max(least), 0);
+    Some(out)
 }
 
-/// Reads a chunk that `walk` stands before. `None`: damage, and the walk is void.
+/// Reads a chunk before which `state` stands; if it is read alone, at the base. `None`: damage, and the state is void.
 pub(super) fn read(
     head: &MeshHead,
     state: &mut Sequel,
+    alone: bool,
     (first, first_face): (u32, u32),
-    count: usize,
-    raw: u64,
+    (count, raw): (usize, u64),
     mut bytes: &[u8],
 ) -> Option<SplitBlock> {
+    let stored = bytes.len() as u64;
     let end = (first as u64).checked_add(count as u64)?;
-    let here = head.base_vertices as usize + first as usize == state.walk.vertices.len()
-        && first_face as usize == state.walk.face_count();
-    if end > head.splits as u64 || !here {
+    let here = alone || head.base_vertices as usize + first as usize == state.walk.vertices.len();
+    if end > head.splits as u64 || !here || first_face != head.first_face(first) {
         return None;
     }
     let first_wedge = u32::try_from(take_varint(&mut bytes)?).ok()?;
@@ -240,8 +268,12 @@ pub(super) fn read(
         moved_positions: places::empty(head.double),
         ..Default::default()
     };
-    let mut codec = Codec::new(head, state, at);
-    codec.begin(&mut streams, &[], [0; 2], count)?;
+    let mut codec = Codec::new(head, state, at, alone);
+    if alone {
+        codec.context(&mut streams, &ProgressiveMesh::default(), None, stored)?;
+    }
+    codec.levels(&mut streams[ERRORS], [0; 2]);
+    codec.begin(&mut streams[CONNECTIVITY], &[], count)?;
     for _ in 0..count {
         codec.split(&mut streams, &mut None, &mut out)?;
         if streams.iter().any(Coder::spent) || out.bytes() > raw {

@@ -7,12 +7,12 @@ use super::cuts::Cuts;
 impl Codec<'_> {
     /// Where the new vertex of a split is expected.
     pub(super) fn guess(&self, v: u32, cuts: &Cuts, moves: bool) -> Guess {
-        let (ring, places) = (&self.ring, &self.walk.places);
-        let t = places[v as usize];
+        let (ring, vertices) = (&self.ring, &self.walk.vertices);
+        let t = vertices[v as usize].place;
         let mut reach = [0.0f64; 3];
         let mut sum = [0.0; 3];
         for k in 0..=cuts.count {
-            let p = places[ring.far(cuts.first + k) as usize];
+            let p = vertices[ring.far(cuts.first + k) as usize].place;
             for a in 0..3 {
                 sum[a] += p[a];
                 reach[a] = reach[a].max((p[a] - t[a]).abs());
@@ -30,9 +30,9 @@ impl Codec<'_> {
 
     /// Where the old vertex of a split is expected to go: it stays near, drawn to the neighbours that it keeps.
     pub(super) fn guess_moved(&self, v: u32, cuts: &Cuts, guess: &Guess) -> Guess {
-        let (ring, places) = (&self.ring, &self.walk.places);
-        let t = places[v as usize];
-        let [l, r] = [cuts.first, cuts.first + cuts.count].map(|k| places[ring.far(k) as usize]);
+        let (ring, vertices) = (&self.ring, &self.walk.vertices);
+        let t = vertices[v as usize].place;
+        let [l, r] = [cuts.first, cuts.first + cuts.count].map(|k| vertices[ring.far(k) as usize].place);
         let tips: [f64; 3] = std::array::from_fn(|a| 0.5 * (l[a] + r[a]));
         let edges = ring.edges();
         let kept = if ring.closed { edges.saturating_sub(cuts.count + 1) } else { 0 };
@@ -42,7 +42,7 @@ impl Codec<'_> {
             if at >= 2 * edges {
                 at -= edges;
             }
-            let p = places[ring.far(at) as usize];
+            let p = vertices[ring.far(at) as usize].place;
             (0..3).for_each(|a| sum[a] += p[a]);
         }
         let outer = if kept > 0 { sum.map(|x| x / kept as f64) } else { tips };

@@ -1,0 +1,299 @@
+//! What a chunk needs to be read alone: the least mesh in which its splits can be done.
+//!
+//! The splits of a chunk depend on others, these on others, down to the base (the l/r rule). The chunk holds all of them again, without what only their own chunk has to
+//! tell: which they are, where they open the mesh, and roughly where their vertices are, so that others can be expected amid them. As a split refers
+//! to the rings of the mesh as it is then, this costs no more than it did the first time, and nothing else has to be named.
+
+use super::super::base::MeshHead;
+use super::super::coder::{Coder, Nibble, Number, unzigzag, zigzag};
+use super::super::residual::Guess;
+use super::super::splits::{CONNECTIVITY, Counts, PLACES, STREAMS};
+use super::super::walk::{NO_LEVEL, Walk};
+use super::cuts::Wanted;
+use super::{Codec, Sequel};
+use crate::aif::NONE;
+use crate::progressive::ProgressiveMesh;
+use std::sync::{Arc, Mutex, PoisonError};
+
+#[derive(Clone, Debug, Default)]
+pub(super) struct Models {
+    sources: Number,
+    count: Number,
+    gap: [Number; 2],
+    /// By how much flatter than long the surroundings are.
+    place: [Nibble; FLAT],
+    far: Number,
+}
+
+/// Classes of how much flatter than long.
+const FLAT: usize = 4;
+/// Places are given in steps of 2^-FINE of the longest reach of the surroundings, rounded to a power of two. One more or less is dearer on bunny and horse: finer
+/// places cost more than they spare.
+const FINE: i32 = 2;
+
+/// The mesh before the first split, ready for any number of readers.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Start(Option<Arc<(Walk, Mutex<Vec<Walk>>)>>);
+
+impl PartialEq for Start {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl Start {
+    /// `None` if the base contradicts itself.
+    pub(in super::super) fn new(pm: &ProgressiveMesh) -> Option<Self> {
+        Some(Start(Some(Arc::new((Walk::new(pm)?, Mutex::default())))))
+    }
+
+    /// At the base.
+    pub(in super::super) fn take(&self) -> Option<Walk> {
+        let (base, free) = &**self.0.as_ref()?;
+        let walk = free.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        Some(walk.unwrap_or_else(|| base.clone()))
+    }
+
+    /// For the next that takes one: clearing what was done takes less time than a new one.
+    pub(in super::super) fn give(&self, state: Sequel) {
+        if let Some((base, free)) = self.0.as_deref() {
+            let mut walk = state.walk;
+            walk.reset(base);
+            free.lock().unwrap_or_else(PoisonError::into_inner).push(walk);
+        }
+    }
+}
+
+/// The splits of the context: their numbers in the file, and their faces.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Known {
+    vertices: u32,
+    faces: u32,
+    first: u32,
+    first_face: u32,
+    ids: Vec<u32>,
+    /// `k << 1 | second` of every face of split `k` of these.
+    of_face: Vec<u32>,
+}
+
+impl Known {
+    pub(super) fn new(head: &MeshHead, first: Counts) -> Self {
+        Known {
+            vertices: head.base_vertices,
+            faces: head.base_faces,
+            first: first.split as u32,
+            first_face: first.face as u32,
+            ..Default::default()
+        }
+    }
+
+    /// How many.
+    pub(super) fn splits(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// The number of a vertex in the file.
+    #[inline]
+    pub(super) fn vertex(&self, v: u32) -> u32 {
+        match v.checked_sub(self.vertices) {
+            None => v,
+            Some(k) => match self.ids.get(k as usize) {
+                Some(&id) => self.vertices + id,
+                None => self.vertices + self.first + (k - self.ids.len() as u32),
+            },
+        }
+    }
+
+    /// A cut by the number of its face in the file.
+    #[inline]
+    pub(super) fn cut(&self, head: &MeshHead, cut: u32) -> Option<u32> {
+        let face = match (cut >> 2).checked_sub(self.faces) {
+            None => cut >> 2,
+            Some(k) => match self.of_face.get(k as usize) {
+                Some(&of) => head.first_face(*self.ids.get((of >> 1) as usize)?) + (of & 1),
+                None => self.first_face + (k - self.of_face.len() as u32),
+            },
+        };
+        Some(face << 2 | cut & 3)
+    }
+}
+
+/// What a writer needs for contexts, and what it knows of that of one chunk.
+pub(in super::super) struct Sources<'a> {
+    head: &'a MeshHead,
+    on: &'a [[u32; 3]],
+    /// The first split of every chunk.
+    chunks: &'a [u32],
+    /// Where vertices are at last.
+    places: &'a [[f64; 3]],
+    first: u32,
+    /// Splits of the context, ascending; of each split its place there.
+    ids: Vec<u32>,
+    slot: Vec<u32>,
+    /// The first face of each, in the mesh of the chunk.
+    faces: Vec<u32>,
+}
+
+impl<'a> Sources<'a> {
+    pub(in super::super) fn new(
+        head: &'a MeshHead,
+        on: &'a [[u32; 3]],
+        chunks: &'a [u32],
+        places: &'a [[f64; 3]],
+    ) -> Self {
+        let slot = vec![NONE; on.len()];
+        Sources { head, on, chunks, places, first: 0, ids: Vec::new(), slot, faces: Vec::new() }
+    }
+
+    /// All splits before `range` that those in it depend on.
+    pub(in super::super) fn find(&mut self, range: std::ops::Range<usize>) {
+        self.ids.drain(..).for_each(|i| self.slot[i as usize] = NONE);
+        self.faces.clear();
+        self.first = range.start as u32;
+        let mut at = 0;
+        let before = |d: &u32| *d < range.start as u32;
+        let slot = &mut self.slot;
+        let mut take = |ids: &mut Vec<u32>, on: &[u32; 3]| {
+            for &d in on.iter().filter(|d| before(d)) {
+                if std::mem::replace(&mut slot[d as usize], 0) == NONE {
+                    ids.push(d);
+                }
+            }
+        };
+        self.on[range.clone()].iter().for_each(|on| take(&mut self.ids, on));
+        while let Some(&i) = self.ids.get(at) {
+            take(&mut self.ids, &self.on[i as usize]);
+            at += 1;
+        }
+        self.ids.sort_unstable();
+        let mut face = self.head.base_faces;
+        for (&i, k) in self.ids.iter().zip(0..) {
+            self.slot[i as usize] = k;
+            self.faces.push(face);
+            face += 2 - self.head.is_single(i) as u32;
+        }
+        self.faces.push(face);
+    }
+
+    /// The number of a vertex in the mesh of the chunk.
+    #[inline]
+    pub(in super::super) fn vertex(&self, v: u32) -> u32 {
+        match v.checked_sub(self.head.base_vertices) {
+            None => v,
+            Some(i) if i >= self.first => v - self.first + self.ids.len() as u32,
+            Some(i) => self.head.base_vertices + self.slot[i as usize],
+        }
+    }
+
+    /// A cut by the number of its face in the mesh of the chunk.
+    #[inline]
+    pub(in super::super) fn cut(&self, cut: u32) -> u32 {
+        let Some((split, second)) = self.head.maker(cut >> 2).filter(|_| cut != NONE) else { return cut };
+        let face = if split >= self.first {
+            let first = self.head.first_face(self.first);
+            self.faces.last().map_or(0, |&f| (cut >> 2) - first + f)
+        } else {
+            self.faces[self.slot[split as usize] as usize] + second as u32
+        };
+        face << 2 | cut & 3
+    }
+
+    fn wanted(&self, pm: &ProgressiveMesh, i: u32) -> Wanted {
+        let (s, i) = (&pm.splits, i as usize);
+        Wanted {
+            vertex: self.vertex(s.vertex[i]),
+            left: self.cut(s.left[i]),
+            right: self.cut(s.right[i]),
+            code: s.code[i],
+        }
+    }
+}
+
+impl Codec<'_> {
+    /// Codes the context and does its splits; it has at most `most`.
+    pub(super) fn context<C: Coder>(
+        &mut self,
+        c: &mut [C; STREAMS],
+        pm: &ProgressiveMesh,
+        sources: Option<&mut Sources<'_>>,
+        most: u64,
+    ) -> Option<()> {
+        let mut known = self.known.take()?;
+        let mut parts: Vec<&[u32]> = Vec::new();
+        if let Some(s) = &sources {
+            let mut rest = &s.ids[..];
+            for &end in s.chunks.iter().skip(1) {
+                let (part, others) = rest.split_at(rest.partition_point(|&i| i < end));
+                parts.extend(Some(part).filter(|p| !p.is_empty()));
+                rest = others;
+            }
+            parts.extend(Some(rest).filter(|p| !p.is_empty()));
+        }
+        self.preparing = true;
+        let number = c[CONNECTIVITY].number(&mut self.m.context.sources, parts.len() as u64);
+        let (mut next, mut near) = (0u32, false);
+        let mut of = Vec::new();
+        for k in 0..number {
+            let part = parts.get(k as usize).copied().unwrap_or_default();
+            let count = c[CONNECTIVITY].number(&mut self.m.context.count, part.len() as u64);
+            if count == 0 || count > most - known.ids.len() as u64 {
+                return None;
+            }
+            of.clear();
+            if let Some(s) = &sources {
+                of.extend(part.iter().map(|&i| s.vertex(pm.splits.vertex[i as usize])));
+            }
+            self.begin(&mut c[CONNECTIVITY], &of, count as usize)?;
+            for k in 0..count as usize {
+                let wanted = sources.as_ref().map(|s| s.wanted(pm, part[k]));
+                let gap = part.get(k).map_or(0, |&i| i - next);
+                let gap = c[CONNECTIVITY].number(&mut self.m.context.gap[near as usize], gap as u64);
+                near = gap == 0;
+                let id = u32::try_from(gap).ok()?.checked_add(next).filter(|&i| i < known.first)?;
+                next = id + 1;
+                let (v, state) = self.sweep(&mut c[CONNECTIVITY], wanted.map_or(NONE, |w| w.vertex))?;
+                let two = !self.head.is_single(id);
+                let (code, cuts) = self.cuts(&mut c[CONNECTIVITY], (v, state), two, wanted)?;
+                let guess = self.guess(v, &cuts, false);
+                let place = sources.as_ref().map_or([0.0; 3], |s| s.places[id as usize]);
+                let place = self.roughly(&mut c[PLACES], &guess, place);
+                self.apply(v, &cuts, code, (place, NO_LEVEL));
+                let k = known.ids.len() as u32;
+                known.ids.push(id);
+                known.of_face.extend((0..1 + two as u32).map(|second| k << 1 | second));
+                if c.iter().any(Coder::spent) {
+                    return None;
+                }
+            }
+        }
+        self.preparing = false;
+        self.known = Some(known);
+        Some(())
+    }
+
+    /// A place, in steps that go with its surroundings.
+    fn roughly<C: Coder>(&mut self, c: &mut C, guess: &Guess, place: [f64; 3]) -> [f64; 3] {
+        let octave = |x: f64| (x.to_bits() >> 52) as i32 - 1023;
+        let longest = octave(guess.reach[0].max(guess.reach[1]).max(guess.reach[2]));
+        let exponent = longest - FINE;
+        if !(-900..900).contains(&exponent) {
+            // All in one place, or nowhere.
+            return guess.at;
+        }
+        let step = f64::from_bits(((exponent + 1023) as u64) << 52);
+        let mut out = guess.at;
+        for a in 0..3 {
+            let flat = (longest - octave(guess.reach[a])).clamp(0, FLAT as i32 - 1) as usize;
+            let steps = ((place[a] - guess.at[a]) / step).round_ties_even() as i64;
+            let z = zigzag(steps.clamp(-(1 << 40), 1 << 40));
+            let near = c.nibble(&mut self.m.context.place[flat], z.min(15) as u32) as u64;
+            let z = if near < 15 {
+                near
+            } else {
+                15 + (c.number(&mut self.m.context.far, z.wrapping_sub(15)) & ((1 << 42) - 1))
+            };
+            out[a] += unzigzag(z) as f64 * step;
+        }
+        out
+    }
+}
