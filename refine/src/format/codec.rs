@@ -12,7 +12,7 @@ use self::context::Known;
 pub(super) use self::context::{Sources, Start};
 use self::cuts::Cuts;
 pub(super) use self::cuts::Wanted;
-use self::sweep::{NEW, TOUCHED};
+use self::sweep::NEW;
 use super::base::MeshHead;
 use super::coder::{Bit, Coder, Decoder, Encoder, Nibble, Number, put_varint, take_varint};
 use super::extras::Extras;
@@ -165,15 +165,13 @@ impl<'a> Codec<'a> {
     /// Does a split.
     #[inline]
     fn apply(&mut self, v: u32, cuts: &Cuts, code: SplitCode, made: ([f64; 3], u16)) {
-        let u = self.walk.vertices.len() as u32;
-        let tips = self.walk.split(v, (cuts.left, cuts.right), cuts.count, code, made);
-        for tip in tips.into_iter().take(1 + code.two_faces() as usize) {
-            self.walk.vertices[tip as usize].visit |= TOUCHED;
-        }
-        let new = &mut self.walk.vertices[u as usize];
+        let u = self.walk.vertices.len();
+        self.walk.split(v, &self.ring, (cuts.first, cuts.count), code, made);
+        let new = &mut self.walk.vertices[u];
         new.visit = NEW;
-        new.to_come = self.to_come.get(u as usize - self.begins).copied().unwrap_or(0);
-        self.pass.extend([u, v]);
+        new.to_come = self.to_come.get(u - self.begins).copied().unwrap_or(0);
+        self.pass.push(u as u32);
+        self.pass.push(v);
     }
 
     /// A level of error: mostly a little below that of the split before at the vertex.

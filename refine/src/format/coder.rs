@@ -226,7 +226,7 @@ impl<'a> Decoder<'a> {
 impl Coder for Decoder<'_> {
     const READS: bool = true;
 
-    #[inline]
+    #[inline(always)]
     fn bit(&mut self, p: &mut Bit, _: bool) -> bool {
         let zero = p.zero();
         let bit = self.state & (TOTAL - 1) >= zero;
@@ -235,7 +235,7 @@ impl Coder for Decoder<'_> {
         bit
     }
 
-    #[inline]
+    #[inline(always)]
     fn nibble(&mut self, m: &mut Nibble, _: u32) -> u32 {
         let symbol = m.find(self.state & (TOTAL - 1));
         self.take(m.share(symbol));
@@ -266,6 +266,7 @@ impl Coder for Decoder<'_> {
         value
     }
 
+    #[inline]
     fn spent(&self) -> bool {
         self.short
     }

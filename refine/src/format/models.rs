@@ -73,24 +73,40 @@ impl Nibble {
     }
 
     /// The symbol in whose share `slot` lies.
-    #[inline]
+    #[inline(always)]
     pub(super) fn find(&self, slot: u32) -> usize {
         let slot = slot as i16;
-        let below: i16 = self.start.iter().map(|&s| (s <= slot) as i16).sum();
-        below as usize - 1
+        // All at once, as vectors do it.
+        let mut below = 0i16;
+        for s in &self.start {
+            below += (*s <= slot) as i16;
+        }
+        (below as usize).wrapping_sub(1) & 15
     }
 
     /// Every start moves towards where it were if only `symbol` came and all others kept a share of 1; fast at first.
-    #[inline]
+    #[inline(always)]
     pub(super) fn learn(&mut self, symbol: usize) {
-        let rate = RATES[(self.seen >> 3) as usize];
+        let rate = RATES[(self.seen >> 3) as usize & 15];
         self.seen += (self.seen < 8 * RATES.len() as u8 - 1) as u8;
-        for (i, s) in self.start.iter_mut().enumerate().skip(1) {
-            let goal = if i > symbol { (TOTAL - 16) as i16 + i as i16 } else { i as i16 };
+        let goals = &GOALS[symbol & 15];
+        for (s, goal) in self.start.iter_mut().zip(goals) {
             *s += (goal - *s) >> rate;
         }
     }
 }
+
+/// Where starts move to, by symbol; the first stays 0.
+const GOALS: [[i16; 16]; 16] = {
+    let mut goals = [[0; 16]; 16];
+    let mut k = 0;
+    while k < 256 {
+        let (symbol, i) = (k / 16, k % 16);
+        goals[symbol][i] = if i > symbol { (TOTAL - 16) as i16 + i as i16 } else { i as i16 };
+        k += 1;
+    }
+    goals
+};
 
 /// How slowly a [`Nibble`] learns, by how many eights of symbols it has seen.
 const RATES: [u8; 16] = [3, 4, 4, 5, 5, 5, 5, 6, 6, 6, 6, 6, 6, 6, 6, 7];

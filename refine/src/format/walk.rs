@@ -29,6 +29,9 @@ pub(super) fn cut(h: u32) -> u32 {
     h >> 3 << 2 | h >> 1 & 3
 }
 
+/// Of [`Vertex::visit`]: the vertex was a tip since.
+pub(super) const TOUCHED: u8 = 8;
+
 /// No error yet.
 pub(super) const NO_LEVEL: u16 = u16::MAX;
 
@@ -270,31 +273,32 @@ impl Walk {
         Some(())
     }
 
-    /// Does a split of `v`: the `count` faces from `left.inner` on go to the new vertex, which is at `place`. Returns the tips.
+    /// Does a split of `v`: the `count` faces behind edge `first` of its ring go to the new vertex, which is at `place`. Returns the tips.
     #[inline]
     pub(super) fn split(
         &mut self,
         v: u32,
-        (left, right): (Cut, Cut),
-        count: usize,
+        ring: &Ring,
+        (first, count): (usize, usize),
         code: SplitCode,
         (place, level): ([f64; 3], u16),
     ) -> [u32; 2] {
         let u = self.vertices.len() as u32;
         let two = code.two_faces();
-        let tips = [left, right].map(|c| c.name().0).map(|h| if h == NONE { NONE } else { self.far(h) });
-        let mut entry = left.inner;
-        for _ in 0..count {
+        let (left, right) = (ring.left(first), ring.right(first, count));
+        let tips = [ring.far(first), if two { ring.far(first + count) } else { NONE }];
+        for k in first..first + count {
+            let entry = ring.edges[ring.around(k)].0;
             if entry == NONE {
                 break;
             }
             self.face_mut(entry >> 3)[NEAR[(entry & 7) as usize] as usize] = u;
-            entry = self.across(turn(entry));
         }
         let (l, old, mut at_u) = self.insert(code.left().1, [v, u, tips[0]], left);
         if two {
             let (r, _, new) = self.insert(code.right().1, [v, u, tips[1]], right);
-            self.connect(l, r);
+            self.link(l, r);
+            self.link(r, l);
             at_u = new;
         } else {
             // At the border, by the edge between both.
@@ -302,15 +306,16 @@ impl Walk {
         }
         let valence = (count + 1 + two as usize).min(u16::MAX as usize) as u16;
         self.changes(v);
-        let label = self.vertices[v as usize].label.split();
-        self.vertices.push(Vertex { place, label, at: at_u, to_come: 0, valence, level, visit: 0 });
         let vertex = &mut self.vertices[v as usize];
+        let label = vertex.label.split();
         (vertex.at, vertex.level) = (old, level);
         vertex.valence = vertex.valence.saturating_add(1 + two as u16).saturating_sub(count as u16);
-        for t in &tips[..1 + two as usize] {
-            self.changes(*t);
-            if let Some(t) = self.vertices.get_mut(*t as usize) {
+        self.vertices.push(Vertex { place, label, at: at_u, to_come: 0, valence, level, visit: 0 });
+        for tip in tips {
+            self.changes(tip);
+            if let Some(t) = self.vertices.get_mut(tip as usize) {
                 t.valence = t.valence.saturating_add(1);
+                t.visit |= TOUCHED;
             }
         }
         tips
@@ -322,24 +327,26 @@ impl Walk {
     fn insert(&mut self, new_next: bool, [v, u, tip]: [u32; 3], at: Cut) -> (u32, u32, u32) {
         let face = self.faces.len() as u32;
         let (b, c) = if new_next { (u, v) } else { (v, u) };
-        self.faces.push([tip, b, c, 0, NONE, NONE, NONE, 0]);
         // Edge 0 ends at corner 1, edge 2 begins at corner 2.
         let (after, before) = (face << 3, face << 3 | 2 << 1 | 1);
         let (old, new) = if new_next { (before, after) } else { (after, before) };
+        let (to_after, to_before) = if new_next { (at.inner, at.outer) } else { (at.outer, at.inner) };
+        // Seen from where the face ends the edge.
+        let link = |to: u32, from: u32| if to == NONE { NONE } else { to ^ from & 1 };
+        self.faces.push([tip, b, c, 0, link(to_after, after), NONE, link(to_before, before), 0]);
         if at.outer != NONE {
-            self.connect(old, at.outer);
+            self.link(at.outer, old);
         }
         if at.inner != NONE {
-            self.connect(new, at.inner);
+            self.link(at.inner, new);
         }
         (face << 3 | 1 << 1 | !new_next as u32, old, new)
     }
 
-    /// Links two halves, both seen from the same vertex.
+    /// Links half `x` to `y`, both seen from the same vertex.
     #[inline]
-    fn connect(&mut self, x: u32, y: u32) {
+    fn link(&mut self, x: u32, y: u32) {
         self.face_mut(x >> 3)[4 + (x >> 1 & 3) as usize] = y ^ x & 1;
-        self.face_mut(y >> 3)[4 + (y >> 1 & 3) as usize] = x ^ y & 1;
     }
 }
 

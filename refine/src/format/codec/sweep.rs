@@ -1,6 +1,7 @@
 //! Which vertex is split next: sweeps over the chunk's vertices, in which each is asked whether its turn has come.
 
 use super::super::coder::Coder;
+use super::super::walk::TOUCHED;
 use super::{Codec, valence_class};
 
 /// What a vertex did when the sweep last came by.
@@ -11,8 +12,6 @@ const SPLIT: u8 = 2;
 const WAITED: u8 = 3;
 const MOST: u8 = 6;
 const DONE: u8 = 7;
-/// Beside these: its ring has grown since.
-pub(super) const TOUCHED: u8 = 8;
 
 impl Codec<'_> {
     /// Codes the least and the largest level of the chunk.
@@ -23,19 +22,20 @@ impl Codec<'_> {
     /// Codes the roots of `count` splits that follow; a writer gives their vertices.
     pub(super) fn begin<C: Coder>(&mut self, c: &mut C, of: &[u32], count: usize) -> Option<()> {
         let first = self.walk.vertices.len() as u32;
-        let mut roots: Vec<u32> = of.iter().copied().filter(|&v| v < first).collect();
-        roots.sort_unstable();
-        for v in of.iter().filter(|&&v| v < first) {
-            self.walk.changes(*v);
-            self.walk.vertices[*v as usize].to_come += 1;
+        let mut older: Vec<u32> = of.iter().copied().filter(|&v| v < first).collect();
+        for &v in &older {
+            self.walk.changes(v);
+            self.walk.vertices[v as usize].to_come += 1;
         }
         self.to_come.clear();
         self.to_come.resize(of.len(), 0);
         for v in of.iter().filter(|&&v| v >= first) {
             *self.to_come.get_mut((v - first) as usize)? += 1;
         }
-        roots.dedup();
-        let number = c.number(&mut self.m.roots, roots.len() as u64);
+        older.sort_unstable();
+        older.dedup();
+        let mut roots: Vec<(u64, u32)> = Vec::with_capacity(older.len());
+        let number = c.number(&mut self.m.roots, older.len() as u64);
         if number > count as u64 {
             return None;
         }
@@ -45,19 +45,20 @@ impl Codec<'_> {
         self.begins = first as usize;
         let mut next = 0u64;
         for k in 0..number as usize {
-            let gap = c.number(&mut self.m.root, roots.get(k).map_or(0, |&r| r as u64 - next));
+            let gap = c.number(&mut self.m.root, older.get(k).map_or(0, |&r| r as u64 - next));
             let v = u32::try_from(next.checked_add(gap)?).ok().filter(|&v| v < first)?;
             next = v as u64 + 1;
             self.walk.changes(v);
-            self.walk.vertices[v as usize].visit = ROOT;
-            self.pass.push(v);
+            let vertex = &mut self.walk.vertices[v as usize];
+            vertex.visit = ROOT;
+            roots.push((vertex.label.key(), v));
             if c.spent() {
                 return None;
             }
         }
         // In the order of descent, the first on top.
-        let vertices = &self.walk.vertices;
-        self.pass.sort_unstable_by_key(|&v| std::cmp::Reverse((vertices[v as usize].label.key(), v)));
+        roots.sort_unstable_by(|a, b| b.cmp(a));
+        self.pass.extend(roots.iter().map(|r| r.1));
         Some(())
     }
 
@@ -82,15 +83,7 @@ impl Codec<'_> {
             }
             let level = vertex.level.min(self.levels[1]).saturating_sub(self.levels[0]);
             // Of the splits that only prepare no level is known.
-            let level = match level {
-                _ if self.preparing => 6,
-                0 => 0,
-                1 | 2 => 1,
-                3 | 4 => 2,
-                5 | 6 => 3,
-                7 | 8 => 4,
-                _ => 5,
-            };
+            let level = if self.preparing { 6 } else { (level as usize).div_ceil(2).min(5) };
             let class = valence_class(vertex.valence as usize);
             if c.bit(&mut self.m.split[state.min(4) as usize][class][level], v == wanted) {
                 vertex.visit = SPLIT;
