@@ -14,6 +14,7 @@
 //! # Ok::<(), progmesh_terrain::GridError>(())
 //! ```
 
+pub mod block;
 mod cache;
 mod georeference;
 mod grid;

@@ -33,7 +33,8 @@ mod patch;
 mod queue;
 mod region;
 mod regular;
-mod scan;
+pub(crate) mod scan;
+pub(crate) mod start;
 mod thin;
 mod verify;
 

@@ -12,7 +12,7 @@ pub(super) struct Corner {
 
 /// Twice the area of a triangle in the plan; positive when it turns from the x axis (columns) to the y axis (rows).
 #[inline]
-pub(super) fn area(a: (i32, i32), b: (i32, i32), c: (i32, i32)) -> i64 {
+pub(crate) fn area(a: (i32, i32), b: (i32, i32), c: (i32, i32)) -> i64 {
     let (ux, uy) = (i64::from(b.0 - a.0), i64::from(b.1 - a.1));
     let (vx, vy) = (i64::from(c.0 - a.0), i64::from(c.1 - a.1));
     ux * vy - uy * vx
@@ -20,7 +20,7 @@ pub(super) fn area(a: (i32, i32), b: (i32, i32), c: (i32, i32)) -> i64 {
 
 /// Calls `f(y, x0, x1)` for every row of samples in the triangle, borders included. No division but one for each side.
 #[inline(always)]
-pub(super) fn rows(a: (i32, i32), b: (i32, i32), c: (i32, i32), mut f: impl FnMut(i32, i32, i32)) {
+pub(crate) fn rows(a: (i32, i32), b: (i32, i32), c: (i32, i32), mut f: impl FnMut(i32, i32, i32)) {
     let mut v = [a, b, c];
     if v[0].1 > v[1].1 {
         v.swap(0, 1);

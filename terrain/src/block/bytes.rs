@@ -1,0 +1,227 @@
+//! Blocks as bytes, so that one may be put aside while others are made. Little-endian, not portable between versions: a cache, no file format.
+
+use super::Collapse;
+use super::join::Block;
+use super::sheet::{Former, Gone, Sheet, Vertex};
+
+/// Bytes that are no block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the bytes are no block")]
+pub struct Damaged;
+
+/// A thing of a fixed number of words.
+trait Words<const N: usize>: Sized {
+    fn to(&self) -> [u32; N];
+    fn of(w: [u32; N]) -> Self;
+}
+
+impl Words<1> for u32 {
+    fn to(&self) -> [u32; 1] {
+        [*self]
+    }
+    fn of([x]: [u32; 1]) -> Self {
+        x
+    }
+}
+
+impl Words<3> for Vertex {
+    fn to(&self) -> [u32; 3] {
+        [self.x as u32, self.y as u32, self.z.to_bits()]
+    }
+    fn of([x, y, z]: [u32; 3]) -> Self {
+        Vertex { x: x as i32, y: y as i32, z: f32::from_bits(z) }
+    }
+}
+
+impl Words<4> for Former {
+    fn to(&self) -> [u32; 4] {
+        let [x, y, z] = self.vertex.to();
+        [x, y, z, self.by]
+    }
+    fn of([x, y, z, by]: [u32; 4]) -> Self {
+        Former { vertex: Vertex::of([x, y, z]), by }
+    }
+}
+
+impl Words<8> for Gone {
+    fn to(&self) -> [u32; 8] {
+        let [a, b] = self.at.map(|v| v.to());
+        [a[0], a[1], a[2], b[0], b[1], b[2], self.counts[0], self.counts[1]]
+    }
+    fn of(w: [u32; 8]) -> Self {
+        Gone { at: [Vertex::of([w[0], w[1], w[2]]), Vertex::of([w[3], w[4], w[5]])], counts: [w[6], w[7]] }
+    }
+}
+
+impl Words<2> for [f32; 2] {
+    fn to(&self) -> [u32; 2] {
+        self.map(f32::to_bits)
+    }
+    fn of(w: [u32; 2]) -> Self {
+        w.map(f32::from_bits)
+    }
+}
+
+impl Words<3> for [u32; 3] {
+    fn to(&self) -> [u32; 3] {
+        *self
+    }
+    fn of(w: [u32; 3]) -> Self {
+        w
+    }
+}
+
+impl Words<6> for [[u32; 2]; 3] {
+    fn to(&self) -> [u32; 6] {
+        let [[a, b], [c, d], [e, f]] = *self;
+        [a, b, c, d, e, f]
+    }
+    fn of([a, b, c, d, e, f]: [u32; 6]) -> Self {
+        [[a, b], [c, d], [e, f]]
+    }
+}
+
+impl Words<10> for Collapse {
+    fn to(&self) -> [u32; 10] {
+        let [[a, b], [c, d]] = self.beside;
+        let [l, r] = self.wings;
+        [self.kept, self.removed, l, r, a, b, c, d, self.bound.to_bits(), self.radius.to_bits()]
+    }
+    fn of([kept, removed, l, r, a, b, c, d, bound, radius]: [u32; 10]) -> Self {
+        Collapse {
+            kept,
+            removed,
+            wings: [l, r],
+            beside: [[a, b], [c, d]],
+            bound: f32::from_bits(bound),
+            radius: f32::from_bits(radius),
+        }
+    }
+}
+
+fn put<const N: usize, T: Words<N>>(out: &mut Vec<u8>, all: &[T]) {
+    out.extend_from_slice(&(all.len() as u32).to_le_bytes());
+    all.iter().flat_map(Words::to).for_each(|w| out.extend_from_slice(&w.to_le_bytes()));
+}
+
+fn take_word(from: &mut &[u8]) -> Result<u32, Damaged> {
+    let (word, rest) = from.split_first_chunk().ok_or(Damaged)?;
+    *from = rest;
+    Ok(u32::from_le_bytes(*word))
+}
+
+fn take<const N: usize, T: Words<N>>(from: &mut &[u8]) -> Result<Vec<T>, Damaged> {
+    let count = take_word(from)? as usize;
+    let bytes = count.checked_mul(4 * N).ok_or(Damaged)?;
+    let (own, rest) = from.split_at_checked(bytes).ok_or(Damaged)?;
+    *from = rest;
+    let words = own.as_chunks::<4>().0.as_chunks::<N>().0;
+    Ok(words.iter().map(|w| T::of(w.map(u32::from_le_bytes))).collect())
+}
+
+impl Sheet {
+    /// As bytes.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut out = vec![];
+        put(&mut out, &self.vertices);
+        put(&mut out, &self.faces);
+        put(&mut out, &self.joined);
+        put(&mut out, &self.last);
+        put(&mut out, &self.counts);
+        put(&mut out, &self.open);
+        put(&mut out, &self.gone);
+        put(&mut out, &self.former);
+        put(&mut out, &self.past);
+        out
+    }
+
+    /// From bytes. What they say is taken as it is: they must come from [`Sheet::to_bytes`].
+    ///
+    /// # Errors
+    /// Bytes that are too short or too long.
+    pub fn from_bytes(mut bytes: &[u8]) -> Result<Sheet, Damaged> {
+        let from = &mut bytes;
+        let sheet = Sheet {
+            vertices: take(from)?,
+            faces: take(from)?,
+            joined: take(from)?,
+            last: take(from)?,
+            counts: take(from)?,
+            open: take(from)?,
+            gone: take(from)?,
+            former: take(from)?,
+            past: take(from)?,
+        };
+        if from.is_empty() { Ok(sheet) } else { Err(Damaged) }
+    }
+}
+
+impl Block {
+    /// All but the sheet as bytes.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut out = vec![];
+        out.extend_from_slice(&self.error.to_le_bytes());
+        put(&mut out, &[self.faces]);
+        put(&mut out, &self.vertices);
+        put(&mut out, &self.collapses);
+        put(&mut out, &self.vertices_left);
+        put(&mut out, &self.faces_left);
+        put(&mut out, &[self.children.len() as u32]);
+        self.children.iter().for_each(|c| put(&mut out, c));
+        out
+    }
+
+    /// From bytes; the sheet is empty. What they say is taken as it is: they must come from [`Block::to_bytes`].
+    ///
+    /// # Errors
+    /// Bytes that are too short or too long.
+    pub fn from_bytes(mut bytes: &[u8]) -> Result<Block, Damaged> {
+        let from = &mut bytes;
+        let (error, rest) = from.split_first_chunk().ok_or(Damaged)?;
+        let error = f64::from_le_bytes(*error);
+        *from = rest;
+        let one = |from: &mut &[u8]| take::<1, u32>(from)?.first().copied().ok_or(Damaged);
+        let mut block = Block {
+            error,
+            faces: one(from)?,
+            vertices: take(from)?,
+            collapses: take(from)?,
+            vertices_left: take(from)?,
+            faces_left: take(from)?,
+            ..Block::default()
+        };
+        for _ in 0..one(from)? {
+            block.children.push(take(from)?);
+        }
+        if from.is_empty() { Ok(block) } else { Err(Damaged) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Grid;
+    use crate::block::{Layout, Relief, join, leaf};
+
+    #[test]
+    fn blocks_come_back() {
+        let heights = (0..33 * 33).map(|i| f64::from(i * 7919 % 101)).collect();
+        let grid = Grid::new(33, 33, heights).unwrap();
+        let layout = Layout::new(33, 33, 16).unwrap();
+        let four = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|at| leaf(&grid, &layout, at, 0.0).unwrap());
+        for b in &four {
+            assert!(!b.sheet.gone.is_empty());
+            assert_eq!(Sheet::from_bytes(&b.sheet.to_bytes()).unwrap(), b.sheet);
+            let bytes = b.to_bytes();
+            let back = Block::from_bytes(&bytes).unwrap();
+            assert_eq!(Block { sheet: b.sheet.clone(), ..back }, *b);
+            assert!((0..bytes.len()).step_by(101).all(|n| Block::from_bytes(&bytes[..n]).is_err()));
+        }
+        let relief = Relief::read(&grid, layout.window(1, [0, 0]), 10_000).unwrap();
+        let root = join(four.map(|b| b.sheet).to_vec(), &relief, &layout.rules(1, [0, 0], 0)).unwrap();
+        let back = Block::from_bytes(&root.to_bytes()).unwrap();
+        assert_eq!((root.children.len(), back.children), (4, root.children.clone()));
+    }
+}

@@ -1,0 +1,261 @@
+//! Heights that triangles are measured against.
+
+use super::Vertex;
+use crate::tin::scan::rows;
+use crate::{Raster, RasterError, Window};
+
+/// The heights of a window of a grid, or of a wide one the least and greatest of every square of samples.
+#[derive(Clone, Debug)]
+pub struct Relief {
+    column: i32,
+    row: i32,
+    /// Samples along the side of a cell, 1 for the samples themselves.
+    cell: i32,
+    /// Cells in a row.
+    across: usize,
+    /// The heights, or the least ones; NaN where all are void.
+    low: Vec<f32>,
+    /// The greatest; empty for cells of one sample.
+    high: Vec<f32>,
+    /// What rounding to f32 changed at most.
+    rounding: f64,
+    /// Greatest height without its sign.
+    greatest: f64,
+}
+
+/// Rows of cells read at once.
+const BAND: usize = 64;
+
+impl Relief {
+    /// Reads a window. Cells are of one sample if at most `most` of them lie in it, or else of as few samples as that takes. O(samples), in memory for the cells.
+    ///
+    /// # Errors
+    /// As [`Raster::read`].
+    pub fn read(raster: &dyn Raster, window: Window, most: usize) -> Result<Self, RasterError> {
+        let mut cell = 1usize;
+        while window.columns.div_ceil(cell).saturating_mul(window.rows.div_ceil(cell)) > most.max(1) {
+            cell += 1;
+        }
+        let across = window.columns.div_ceil(cell);
+        let mut relief = Relief {
+            column: window.column as i32,
+            row: window.row as i32,
+            cell: cell as i32,
+            across,
+            low: vec![],
+            high: vec![],
+            rounding: 0.0,
+            greatest: 0.0,
+        };
+        let band = if cell == 1 { BAND } else { cell };
+        let mut heights = vec![];
+        for first in (0..window.rows).step_by(band) {
+            let rows = band.min(window.rows - first);
+            heights.resize(window.columns * rows, f64::NAN);
+            raster
+                .read(Window::new(window.column, window.row + first, window.columns, rows), &mut heights)?;
+            relief.append(&heights, window.columns);
+        }
+        Ok(relief)
+    }
+
+    fn append(&mut self, heights: &[f64], columns: usize) {
+        let start = self.low.len();
+        if self.cell == 1 {
+            self.low.extend(heights.iter().map(|&h| h as f32));
+        } else {
+            self.low.resize(start + self.across, f32::NAN);
+            self.high.resize(start + self.across, f32::NAN);
+        }
+        for (i, &h) in heights.iter().enumerate().filter(|(_, h)| !h.is_nan()) {
+            let f = h as f32;
+            self.rounding = self.rounding.max((h - f64::from(f)).abs());
+            self.greatest = self.greatest.max(h.abs());
+            if self.cell > 1 {
+                let at = start + i % columns / self.cell as usize;
+                // NaN gives way.
+                self.low[at] = self.low[at].min(f);
+                self.high[at] = self.high[at].max(f);
+            }
+        }
+    }
+
+    /// Heights are measured cell by cell, not sample by sample.
+    #[must_use]
+    pub fn is_coarse(&self) -> bool {
+        self.cell > 1
+    }
+
+    /// What is to be added to a greatest distance measured in f32 heights: what rounding them changed, and the arithmetic.
+    fn allowance(&self) -> f64 {
+        self.rounding + self.greatest * 1e-12
+    }
+
+    /// The greatest vertical distance of a triangle from the samples in it, or a bound of that; more than `enough` need not be exact. O(samples in it).
+    ///
+    /// Orientation does not matter; a triangle that is flat in the plan has none.
+    pub(super) fn error(&self, [a, b, c]: [Vertex; 3], enough: f64) -> f64 {
+        let (ux, uy) = (i64::from(b.x - a.x), i64::from(b.y - a.y));
+        let (vx, vy) = (i64::from(c.x - a.x), i64::from(c.y - a.y));
+        let area = ux * vy - uy * vx;
+        // A triangle of area 1 has no sample but its corners.
+        if area.abs() <= 1 && self.cell == 1 || area == 0 {
+            return if self.rounding > 0.0 && area != 0 { self.rounding } else { 0.0 };
+        }
+        let (uz, vz) = (f64::from(b.z) - f64::from(a.z), f64::from(c.z) - f64::from(a.z));
+        let dx = (uz * vy as f64 - vz * uy as f64) / area as f64;
+        let dy = (ux as f64 * vz - vx as f64 * uz) / area as f64;
+        let (b, c) = if area < 0 { (c, b) } else { (b, c) };
+        let z = f64::from(a.z);
+        let most = if self.cell == 1 {
+            self.fine(a, b, c, z, dx, dy, enough)
+        } else {
+            self.coarse(a, b, c, z, dx, dy)
+        };
+        most + self.allowance()
+    }
+
+    /// The greatest height less the least in the box of these vertices: no triangle of them is farther from a sample in it. O(samples in the box).
+    pub(super) fn span(&self, vertices: impl Iterator<Item = Vertex>) -> f64 {
+        let none = (i32::MAX, i32::MIN, i32::MAX, i32::MIN);
+        let (x0, x1, y0, y1) =
+            vertices.fold(none, |b, v| (b.0.min(v.x), b.1.max(v.x), b.2.min(v.y), b.3.max(v.y)));
+        let cells =
+            |a: i32, b: i32, from: i32| ((a - from) / self.cell) as usize..=((b - from) / self.cell) as usize;
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        let greatest = if self.cell == 1 { &self.low } else { &self.high };
+        for line in cells(y0, y1, self.row) {
+            for k in cells(x0, x1, self.column) {
+                let at = line * self.across + k;
+                // Void ones give way.
+                (low, high) = (low.min(self.low[at]), high.max(greatest[at]));
+            }
+        }
+        (f64::from(high) - f64::from(low)).max(0.0) + self.allowance()
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn fine(&self, a: Vertex, b: Vertex, c: Vertex, z: f64, dx: f64, dy: f64, enough: f64) -> f64 {
+        let mut most = 0.0f64;
+        rows((a.x, a.y), (b.x, b.y), (c.x, c.y), |y, x0, x1| {
+            if most > enough {
+                return;
+            }
+            let from = (y - self.row) as usize * self.across + (x0 - self.column) as usize;
+            let heights = &self.low[from..=from + (x1 - x0) as usize];
+            let start = z + dx * f64::from(x0 - a.x) + dy * f64::from(y - a.y);
+            let mut lanes = [0.0f64; 4];
+            let (chunks, rest) = heights.as_chunks::<4>();
+            let mut at = 0.0;
+            for chunk in chunks {
+                for (k, lane) in lanes.iter_mut().enumerate() {
+                    let e = (start + dx * (at + k as f64) - f64::from(chunk[k])).abs();
+                    // Void samples compare as nothing.
+                    *lane = if e > *lane { e } else { *lane };
+                }
+                at += 4.0;
+            }
+            for &h in rest {
+                let e = (start + dx * at - f64::from(h)).abs();
+                most = if e > most { e } else { most };
+                at += 1.0;
+            }
+            most = lanes.into_iter().fold(most, f64::max);
+        });
+        most
+    }
+
+    /// Over every cell that the triangle's rows touch, what the plane does over the part of it within the triangle's box.
+    fn coarse(&self, a: Vertex, b: Vertex, c: Vertex, z: f64, dx: f64, dy: f64) -> f64 {
+        let mut most = 0.0f64;
+        let (mut line, mut left, mut right) = (i32::MIN, 0, 0);
+        let mut flush = |line: i32, x0: i32, x1: i32, y0: i32, y1: i32| {
+            let (lo, hi) = ((x0 - self.column) / self.cell, (x1 - self.column) / self.cell);
+            for k in lo..=hi {
+                let at = line as usize * self.across + k as usize;
+                let first = self.column + k * self.cell;
+                let (p, q) = (x0.max(first), x1.min(first + self.cell - 1));
+                let at_corner = |x: i32, y: i32| z + dx * f64::from(x - a.x) + dy * f64::from(y - a.y);
+                let corners = [at_corner(p, y0), at_corner(q, y0), at_corner(p, y1), at_corner(q, y1)];
+                let (low, high) = (f64::from(self.low[at]), f64::from(self.high[at]));
+                for t in corners {
+                    let e = (t - low).max(high - t);
+                    most = if e > most { e } else { most };
+                }
+            }
+        };
+        let (mut y0, mut y1) = (0, 0);
+        rows((a.x, a.y), (b.x, b.y), (c.x, c.y), |y, x0, x1| {
+            let own = (y - self.row) / self.cell;
+            if own == line {
+                (left, right, y1) = (left.min(x0), right.max(x1), y);
+            } else {
+                if line != i32::MIN {
+                    flush(line, left, right, y0, y1);
+                }
+                (line, left, right, y0, y1) = (own, x0, x1, y, y);
+            }
+        });
+        if line != i32::MIN {
+            flush(line, left, right, y0, y1);
+        }
+        most
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Grid;
+    use proptest::prelude::*;
+
+    fn brute(grid: &Grid, t: [Vertex; 3]) -> f64 {
+        let side = |p: Vertex, q: Vertex, x: i32, y: i32| {
+            f64::from(q.x - p.x) * f64::from(y - p.y) - f64::from(q.y - p.y) * f64::from(x - p.x)
+        };
+        let area = side(t[0], t[1], t[2].x, t[2].y);
+        let mut most = 0.0f64;
+        for y in 0..grid.rows() as i32 {
+            for x in 0..grid.columns() as i32 {
+                let w = [side(t[1], t[2], x, y), side(t[2], t[0], x, y), side(t[0], t[1], x, y)];
+                if area == 0.0 || w.iter().any(|&w| w * area < 0.0) {
+                    continue;
+                }
+                let z: f64 = (0..3).map(|k| w[k] / area * f64::from(t[k].z)).sum();
+                most = most.max((z - grid.height(x as usize, y as usize).unwrap()).abs());
+            }
+        }
+        most
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+        #[test]
+        fn errors_are_those_of_all_samples_and_cells_bound_them(
+            heights in proptest::collection::vec(-50i32..50, 14 * 11),
+            p in proptest::array::uniform3((0i32..14, 0i32..11)),
+        ) {
+            let grid = Grid::new(14, 11, heights.iter().map(|&h| f64::from(h)).collect()).unwrap();
+            let t = p.map(|(x, y)| Vertex { x, y, z: grid.height(x as usize, y as usize).unwrap() as f32 });
+            let want = brute(&grid, t);
+            let all = Window::new(0, 0, 14, 11);
+            let fine = Relief::read(&grid, all, 1000).unwrap();
+            prop_assert!((fine.error(t, f64::INFINITY) - want).abs() < 1e-9);
+            for most in [60, 20, 1] {
+                let coarse = Relief::read(&grid, all, most).unwrap();
+                prop_assert!(coarse.is_coarse());
+                prop_assert!(coarse.error(t, f64::INFINITY) >= want);
+            }
+        }
+    }
+
+    #[test]
+    fn what_rounding_changes_is_added() {
+        let heights: Vec<f64> = (0..9).map(|i| 1e8 + 0.3 * f64::from(i)).collect();
+        let grid = Grid::new(3, 3, heights).unwrap();
+        let relief = Relief::read(&grid, Window::new(0, 0, 3, 3), 9).unwrap();
+        let v = |x: i32, y: i32| Vertex { x, y, z: grid.height(x as usize, y as usize).unwrap() as f32 };
+        let t = [v(0, 0), v(2, 0), v(2, 2)];
+        assert!(relief.error(t, f64::INFINITY) >= brute(&grid, t));
+    }
+}
