@@ -10,6 +10,7 @@ pub use progmesh_refine as refine;
 pub use progmesh_simplify as simplify;
 pub use progmesh_terrain as terrain;
 
+pub mod blocks;
 pub mod compare;
 pub mod ground;
 pub mod io;

@@ -518,6 +518,94 @@ impl Drop for Staged {
     }
 }
 
+/// What tells a file from another of its name, or from itself after a change: name, size, and when it was changed last.
+///
+/// Errors: the system's.
+pub fn identity(path: &Path) -> io::Result<String> {
+    if is_dash(path) {
+        return Ok("standard input".into());
+    }
+    let about = fs::metadata(path)?;
+    let changed = about.modified()?.duration_since(std::time::UNIX_EPOCH).unwrap_or_default().as_nanos();
+    Ok(format!("{} {} {changed}", path.display(), about.len()))
+}
+
+/// A folder for what is put aside during long work, so that a run that was interrupted can go on.
+#[derive(Debug)]
+pub struct WorkFolder {
+    path: PathBuf,
+}
+
+/// The file of a [`WorkFolder`] that says what it belongs to.
+const BELONGS: &str = "belongs-to";
+
+impl WorkFolder {
+    /// Opens the folder, or makes it. What it holds is kept if it belongs to the same work, as `belongs` says it, and removed otherwise.
+    ///
+    /// Errors: the system's; a folder that is not empty and was not made here.
+    pub fn open(path: &Path, belongs: &str) -> io::Result<WorkFolder> {
+        let folder = WorkFolder { path: path.to_path_buf() };
+        match fs::read(path.join(BELONGS)) {
+            Ok(known) if known == belongs.as_bytes() => return Ok(folder),
+            Ok(_) => folder.clear()?,
+            Err(e) if e.kind() == ErrorKind::NotFound => {
+                fs::create_dir_all(path)?;
+                // What a run that was killed at once may have left.
+                folder.clear_temporary()?;
+                if fs::read_dir(path)?.next().is_some() {
+                    let what = "the folder for unfinished work is there, holds files, and was not made by this program";
+                    return Err(io::Error::new(ErrorKind::AlreadyExists, what));
+                }
+            }
+            Err(e) => return Err(e),
+        }
+        write_file(&path.join(BELONGS), belongs.as_bytes())?;
+        Ok(folder)
+    }
+
+    /// Removes the folder with all that was put there.
+    ///
+    /// Errors: the system's; files that were not put there by this program stay, and the folder with them.
+    pub fn remove(self) -> io::Result<()> {
+        self.clear()?;
+        fs::remove_dir(&self.path)
+    }
+
+    fn clear(&self) -> io::Result<()> {
+        self.clear_temporary()?;
+        self.clear_by(|name| name.ends_with(".block") || name.ends_with(".sheet"))?;
+        self.clear_by(|name| name == BELONGS)
+    }
+
+    fn clear_temporary(&self) -> io::Result<()> {
+        self.clear_by(|name| name.starts_with(".progmesh-") && name.ends_with(".tmp"))
+    }
+
+    fn clear_by(&self, which: impl Fn(&str) -> bool) -> io::Result<()> {
+        for entry in fs::read_dir(&self.path)? {
+            let entry = entry?;
+            if entry.file_name().to_str().is_some_and(&which) {
+                fs::remove_file(entry.path())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl crate::blocks::Store for WorkFolder {
+    fn has(&self, name: &str) -> io::Result<bool> {
+        fs::exists(self.path.join(name))
+    }
+
+    fn get(&self, name: &str) -> io::Result<Vec<u8>> {
+        fs::read(self.path.join(name))
+    }
+
+    fn put(&self, name: &str, bytes: &[u8]) -> io::Result<()> {
+        write_file(&self.path.join(name), bytes)
+    }
+}
+
 /// The most memory this process has held so far, in bytes; `None` where the system does not tell (all but Linux).
 pub fn peak_bytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;

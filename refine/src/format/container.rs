@@ -37,7 +37,7 @@ impl ChunkType {
     pub const SCENE: ChunkType = ChunkType(*b"SCNE");
     /// Bounds of splits for view-dependent refinement.
     pub const BOUNDS: ChunkType = ChunkType(*b"BNDS");
-    /// Blocks of a terrain (specified, not written yet).
+    /// What a mesh is of a height grid.
     pub const TERRAIN: ChunkType = ChunkType(*b"TERR");
 }
 

@@ -30,6 +30,8 @@ pub struct EncodeOptions {
     /// Splits of a chunk, at most but for those of a single vertex; by default 16,384, and 8,192 of chunks that follow each other. With smaller ones less has to be fetched for a region,
     /// and more in all.
     pub chunk: Option<u32>,
+    /// Chunks of other kinds, which readers may skip: what they are, of which mesh (`u32::MAX` for none), and what they hold.
+    pub others: Vec<(ChunkType, u32, Vec<u8>)>,
 }
 
 impl EncodeOptions {
@@ -61,6 +63,12 @@ impl EncodeOptions {
     /// Sets [`EncodeOptions::chunk`].
     pub fn with_chunk(mut self, splits: Option<u32>) -> Self {
         self.chunk = splits;
+        self
+    }
+
+    /// Adds to [`EncodeOptions::others`].
+    pub fn with_other(mut self, kind: ChunkType, mesh: u32, bytes: Vec<u8>) -> Self {
+        self.others.push((kind, mesh, bytes));
         self
     }
 
@@ -163,6 +171,8 @@ pub fn encode(
     if !scene.is_empty() {
         all.push(part(ChunkType::SCENE, false, u32::MAX, scene.len() as u64, scene.to_vec()));
     }
+    // They may tell what to do with the splits.
+    all.extend(options.others.iter().map(|(kind, m, bytes)| part(*kind, false, *m, bytes.len() as u64, bytes.clone())));
     all.extend(interleave(chunks));
     all.extend(orders);
     let mut directory =

@@ -107,6 +107,17 @@ impl GridInput {
         options
     }
 
+    /// What tells it from another grid, or from itself after a change, as far as names, sizes and times do.
+    pub(crate) fn identity(&self) -> Result<String, Failure> {
+        let of = |p: &PathBuf| {
+            let failed = |e| Failure::Input(format!("{}: {e}", common::name(p, "standard input")));
+            files::identity(p).map_err(failed)
+        };
+        let files: Vec<String> = self.grids.iter().map(of).collect::<Result<_, _>>()?;
+        let (size, sample, encoding, nodata) = (self.size, self.sample, self.encoding, self.nodata);
+        Ok(format!("{files:?} {:?} {size:?} {sample:?} {encoding:?} {nodata:?}", self.from))
+    }
+
     /// Opens it: what it says about itself is read, and its heights when asked for.
     pub(crate) fn open(&self, warnings: &mut Warnings) -> Result<GridFile, Failure> {
         // All files share the options' cache.

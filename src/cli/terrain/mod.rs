@@ -1,12 +1,13 @@
 //! `progmesh terrain`: height grids.
 
+mod build;
 mod info;
 pub(crate) mod input;
 mod tin;
 
 use super::Failure;
 
-/// Height grids: say what they hold, make triangles of them.
+/// Height grids: say what they hold, make triangles or progressive terrains of them.
 ///
 /// Grids are GeoTIFF, HGT, ESRI ASCII, PNG (grey, Terrain-RGB or Terrarium) or raw samples.
 #[derive(clap::Args, Debug)]
@@ -19,6 +20,7 @@ pub(crate) struct Args {
 enum Command {
     Info(info::Args),
     Tin(Box<tin::Args>),
+    Build(Box<build::Args>),
 }
 
 impl Args {
@@ -26,6 +28,7 @@ impl Args {
         match self.command {
             Command::Info(args) => args.run(),
             Command::Tin(args) => args.run(),
+            Command::Build(args) => args.run(),
         }
     }
 }

@@ -3,8 +3,10 @@
 
 mod chunk;
 pub mod hoppe;
+mod terrain;
 
 pub use chunk::{read_shell, write_shell};
+pub use terrain::{Terrain, encode_terrain};
 
 use super::{DecodeError, Decoded};
 use crate::aif::NONE;

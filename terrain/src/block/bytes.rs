@@ -1,7 +1,7 @@
 //! Blocks as bytes, so that one may be put aside while others are made. Little-endian, not portable between versions: a cache, no file format.
 
 use super::Collapse;
-use super::join::Block;
+use super::join::{Block, Child};
 use super::sheet::{Former, Gone, Sheet, Vertex};
 
 /// Bytes that are no block.
@@ -169,7 +169,10 @@ impl Block {
         put(&mut out, &self.vertices_left);
         put(&mut out, &self.faces_left);
         put(&mut out, &[self.children.len() as u32]);
-        self.children.iter().for_each(|c| put(&mut out, c));
+        for c in &self.children {
+            put(&mut out, &[c.faces]);
+            put(&mut out, &c.vertices);
+        }
         out
     }
 
@@ -193,7 +196,7 @@ impl Block {
             ..Block::default()
         };
         for _ in 0..one(from)? {
-            block.children.push(take(from)?);
+            block.children.push(Child { faces: one(from)?, vertices: take(from)? });
         }
         if from.is_empty() { Ok(block) } else { Err(Damaged) }
     }

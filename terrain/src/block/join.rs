@@ -7,6 +7,15 @@ use super::relief::Relief;
 use super::sheet::{Sheet, Vertex};
 use std::collections::HashMap;
 
+/// What the sheet of a block became in the one it was joined to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Child {
+    /// For each of its vertices, which of the joined block's it is.
+    pub vertices: Vec<u32>,
+    /// How many faces it had.
+    pub faces: u32,
+}
+
 /// A block after its collapses.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Block {
@@ -22,14 +31,14 @@ pub struct Block {
     pub faces_left: Vec<u32>,
     /// What is left of it.
     pub sheet: Sheet,
-    /// For each of the blocks it was joined of, for each vertex of that one's sheet, which of `vertices` it is. Their faces follow each other. Empty at level 0.
-    pub children: Vec<Vec<u32>>,
+    /// The blocks that it was joined of; their faces follow each other. Empty at level 0.
+    pub children: Vec<Child>,
     /// The greatest error of the triangulation it began with, at level 0.
     pub error: f64,
 }
 
 impl Block {
-    pub(super) fn new(vertices: Vec<Vertex>, made: Collapsed, children: Vec<Vec<u32>>, error: f64) -> Self {
+    pub(super) fn new(vertices: Vec<Vertex>, made: Collapsed, children: Vec<Child>, error: f64) -> Self {
         let faces = made.faces.len()
             + made.collapses.iter().map(|c| c.wings.iter().filter(|&&w| w != NONE).count()).sum::<usize>();
         Block {
@@ -71,8 +80,9 @@ pub fn join(sheets: Vec<Sheet>, relief: &Relief, rules: &Rules) -> Result<Block,
                 own
             })
             .collect();
+        let faces = sheet.faces.len() as u32;
         all.append(sheet, &map);
-        children.push(map);
+        children.push(Child { vertices: map, faces });
     }
     let vertices = all.vertices.clone();
     let rules = Rules { vertices: if rules.shared == [false; 4] { 0 } else { vertices.len() / 4 }, ..*rules };

@@ -26,7 +26,7 @@ mod surface;
 
 pub use bytes::Damaged;
 pub use collapse::{Collapse, Rules};
-pub use join::{Block, join};
+pub use join::{Block, Child, join};
 pub use leaf::{BlockError, Layout, leaf};
 pub use relief::Relief;
 pub use sheet::{Sheet, Vertex};

@@ -1,0 +1,274 @@
+//! Progressive terrain: the block hierarchy of a height grid ([`crate::terrain::block`]) as a progressive mesh.
+//!
+//! Blocks are made level by level, those of a level side by side; each goes to a [`Store`] when it is done, from where the next level takes what is left of it, and
+//! an interrupted run what it had done. At the end all collapses, the last first, are numbered as splits.
+//!
+//! The mesh has x = column, y = height, z = row, as they are; faces look up.
+
+mod number;
+mod store;
+
+pub use store::{InMemory, Store};
+
+use crate::refine::ProgressiveMesh;
+use crate::terrain::block::{Block, BlockError, Layout, Relief, Sheet, join, leaf};
+use crate::terrain::{Raster, RasterError};
+use number::Assembly;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// How a progressive terrain is made. Start from `Options::default()` and set what differs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Options {
+    /// At full detail every sample is within this of the mesh; at 0 every sample is a vertex.
+    pub floor: f64,
+    /// Steps along a side of a block of the finest level. Larger ones lock fewer vertices, but take more memory.
+    pub cells: usize,
+    /// About how many bytes of heights and blocks to hold at once. Above 16 of it a block has as many heights, it is measured against the least and greatest of squares of them,
+    /// which makes bounds of the coarsest blocks a little larger.
+    pub memory: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options { floor: 0.0, cells: 256, memory: 384 << 20 }
+    }
+}
+
+impl Options {
+    /// With every sample within this at full detail.
+    #[must_use]
+    pub fn with_floor(mut self, floor: f64) -> Self {
+        self.floor = floor;
+        self
+    }
+
+    /// With blocks of so many steps a side.
+    #[must_use]
+    pub fn with_cells(mut self, cells: usize) -> Self {
+        self.cells = cells;
+        self
+    }
+
+    /// With about so many bytes of memory.
+    #[must_use]
+    pub fn with_memory(mut self, bytes: usize) -> Self {
+        self.memory = bytes;
+        self
+    }
+
+    /// Heights, or cells of them, that one block is measured against.
+    fn most_heights(&self) -> usize {
+        (self.memory / 16).max(1 << 12)
+    }
+}
+
+/// Watches and stops the work. Threads call it.
+pub use crate::terrain::tin::Control;
+
+/// Why there is no progressive terrain.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// The grid has no cell, or blocks have none, or more samples than ids can name.
+    #[error("{columns} x {rows} samples in blocks of {cells}: at least 2 x 2 samples are needed, and blocks of 2 to 16,384 steps")]
+    Layout {
+        /// Samples in a row.
+        columns: usize,
+        /// Samples in a column.
+        rows: usize,
+        /// Steps along a side of a block.
+        cells: usize,
+    },
+    /// A floor that is no number, or negative.
+    #[error("a floor must be a number, 0 or more")]
+    Floor,
+    /// No three neighbouring samples are valid.
+    #[error("no three neighbouring samples are valid: there is nothing to triangulate")]
+    Nothing,
+    /// Blocks were not made.
+    #[error(transparent)]
+    Block(#[from] BlockError),
+    /// What was put aside could not be written or read.
+    #[error("the work folder: {0}")]
+    Store(#[from] std::io::Error),
+    /// More triangles than a progressive mesh can number.
+    #[error("{0} triangles are more than a progressive mesh can number (2^29); a larger --floor leaves fewer")]
+    TooLarge(u64),
+    /// Stopped by [`Control::cancelled`]. Finished blocks are in the store.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+impl From<RasterError> for BuildError {
+    fn from(e: RasterError) -> Self {
+        BuildError::Block(e.into())
+    }
+}
+
+/// A progressive terrain.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Built {
+    /// The mesh. The errors of its splits are bounds on differences of height, proven for every order of refinement.
+    pub mesh: ProgressiveMesh,
+    /// The radius of a sphere about the vertex of each split within which its bound holds; none is smaller than what it must hold for splits below.
+    pub radii: Vec<f32>,
+    /// The greatest difference of height between a sample and full detail.
+    pub error: f64,
+    /// Levels of blocks.
+    pub levels: u32,
+    /// Blocks of all levels.
+    pub blocks: usize,
+    /// Those of them that the store had already.
+    pub found: usize,
+}
+
+/// Builds a progressive terrain. The same for any number of threads, and whatever the store has already of the same grid and options.
+///
+/// O(samples log samples). Memory: about [`Options::memory`], and that of the mesh at the end.
+///
+/// # Errors
+/// [`BuildError`].
+pub fn build(
+    raster: &dyn Raster,
+    options: &Options,
+    store: &dyn Store,
+    control: &dyn Control,
+) -> Result<Built, BuildError> {
+    let (columns, rows, cells) = (raster.columns(), raster.rows(), options.cells);
+    let layout = Layout::new(columns, rows, cells).ok_or(BuildError::Layout { columns, rows, cells })?;
+    if !(options.floor >= 0.0 && options.floor.is_finite()) {
+        return Err(BuildError::Floor);
+    }
+    let levels = layout.levels();
+    let total: usize = (0..levels).map(|l| layout.blocks(l).iter().product::<usize>()).sum();
+    let work = Work { raster, layout, options, store, control };
+    let (done, found) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    for level in 0..levels {
+        let [across, down] = layout.blocks(level);
+        let all: Vec<[usize; 2]> = (0..down).flat_map(|y| (0..across).map(move |x| [x, y])).collect();
+        for group in all.chunks(work.at_once(level)) {
+            let one = |at: &[usize; 2]| {
+                if control.cancelled() {
+                    return Err(BuildError::Cancelled);
+                }
+                found.fetch_add(usize::from(work.make(level, *at)?), Ordering::Relaxed);
+                // Each level has as many samples to look at as the first, but far fewer vertices.
+                let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+                control.progress(0.9 * count as f64 / total as f64);
+                Ok(())
+            };
+            each(group, one)?;
+        }
+    }
+    work.number(levels, total, found.into_inner())
+}
+
+/// `f` of each; on several threads with feature `parallel`. The first error in order.
+fn each<T: Sync>(all: &[T], f: impl Fn(&T) -> Result<(), BuildError> + Sync) -> Result<(), BuildError> {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        let results: Vec<_> = all.par_iter().map(&f).collect();
+        results.into_iter().collect()
+    }
+    #[cfg(not(feature = "parallel"))]
+    all.iter().try_for_each(f)
+}
+
+struct Work<'a> {
+    raster: &'a dyn Raster,
+    layout: Layout,
+    options: &'a Options,
+    store: &'a dyn Store,
+    control: &'a dyn Control,
+}
+
+fn name(level: u32, [column, row]: [usize; 2], what: &str) -> String {
+    format!("{level}-{column}-{row}.{what}")
+}
+
+/// What a sample of the finest level takes while it is worked on, about: triangles, their links, chains of former vertices, and the queue.
+const BYTES: usize = 400;
+
+impl Work<'_> {
+    /// Blocks of a level that may be worked on at once.
+    fn at_once(&self, level: u32) -> usize {
+        let heights = self.layout.window(level, [0, 0]).samples().unwrap_or(usize::MAX);
+        let own = 4 * heights.min(self.options.most_heights());
+        let mesh = BYTES * (self.options.cells + 1).pow(2);
+        (self.options.memory / (own + mesh).max(1)).max(1)
+    }
+
+    /// Makes a block unless the store has it; true if it had.
+    fn make(&self, level: u32, at: [usize; 2]) -> Result<bool, BuildError> {
+        let (block_name, sheet_name) = (name(level, at, "block"), name(level, at, "sheet"));
+        if self.store.has(&block_name)? && self.store.has(&sheet_name)? {
+            return Ok(true);
+        }
+        let block = if level == 0 {
+            leaf(self.raster, &self.layout, at, self.options.floor)?
+        } else {
+            let mut sheets = vec![];
+            for child in children(&self.layout, level, at) {
+                sheets.push(self.sheet(level - 1, child)?);
+            }
+            let window = self.layout.window(level, at);
+            let relief = Relief::read(self.raster, window, self.options.most_heights())?;
+            join(sheets, &relief, &self.layout.rules(level, at, 0))?
+        };
+        self.store.put(&sheet_name, &block.sheet.to_bytes())?;
+        self.store.put(&block_name, &block.to_bytes())?;
+        Ok(false)
+    }
+
+    fn sheet(&self, level: u32, at: [usize; 2]) -> Result<Sheet, BuildError> {
+        Sheet::from_bytes(&self.store.get(&name(level, at, "sheet"))?).map_err(damaged)
+    }
+
+    fn block(&self, level: u32, at: [usize; 2]) -> Result<Block, BuildError> {
+        Block::from_bytes(&self.store.get(&name(level, at, "block"))?).map_err(damaged)
+    }
+
+    /// All splits, from the root down, each level row by row.
+    fn number(&self, levels: u32, blocks: usize, found: usize) -> Result<Built, BuildError> {
+        let root = self.sheet(levels - 1, [0, 0])?;
+        let (mut assembly, numbers) = Assembly::new(&root);
+        let mut here = vec![([0, 0], numbers)];
+        let mut error = 0.0f64;
+        for level in (0..levels).rev() {
+            let mut below = vec![];
+            for (at, numbers) in here {
+                if self.control.cancelled() {
+                    return Err(BuildError::Cancelled);
+                }
+                let block = self.block(level, at)?;
+                error = error.max(block.error);
+                let of_children = assembly.add(&block, numbers)?;
+                if level > 0 {
+                    below.extend(children(&self.layout, level, at).into_iter().zip(of_children));
+                }
+            }
+            below.sort_by_key(|(at, _)| [at[1], at[0]]);
+            here = below;
+        }
+        if assembly.mesh.base_faces.is_empty() {
+            return Err(BuildError::Nothing);
+        }
+        self.control.progress(1.0);
+        let (mesh, radii) = assembly.finish();
+        Ok(Built { mesh, radii, error, levels, blocks, found })
+    }
+}
+
+fn damaged(e: crate::terrain::block::Damaged) -> BuildError {
+    BuildError::Store(std::io::Error::new(std::io::ErrorKind::InvalidData, e))
+}
+
+/// The blocks that one is joined of, in rows.
+fn children(layout: &Layout, level: u32, [column, row]: [usize; 2]) -> Vec<[usize; 2]> {
+    let [across, down] = layout.blocks(level - 1);
+    let all = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| [2 * column + x, 2 * row + y]);
+    all.into_iter().filter(|[x, y]| *x < across && *y < down).collect()
+}

@@ -1,0 +1,47 @@
+//! Where finished blocks are put aside.
+
+use std::collections::HashMap;
+use std::io;
+use std::sync::{Mutex, PoisonError};
+
+/// Keeps bytes by name. What was put is there whole or not at all, also after the process was killed.
+pub trait Store: Sync {
+    /// True if there is something of this name.
+    ///
+    /// # Errors
+    /// The system's.
+    fn has(&self, name: &str) -> io::Result<bool>;
+
+    /// What was put there.
+    ///
+    /// # Errors
+    /// The system's; nothing of this name.
+    fn get(&self, name: &str) -> io::Result<Vec<u8>>;
+
+    /// Puts bytes there.
+    ///
+    /// # Errors
+    /// The system's.
+    fn put(&self, name: &str, bytes: &[u8]) -> io::Result<()>;
+}
+
+/// A store in memory.
+#[derive(Debug, Default)]
+pub struct InMemory(Mutex<HashMap<String, Vec<u8>>>);
+
+impl Store for InMemory {
+    fn has(&self, name: &str) -> io::Result<bool> {
+        Ok(self.0.lock().unwrap_or_else(PoisonError::into_inner).contains_key(name))
+    }
+
+    fn get(&self, name: &str) -> io::Result<Vec<u8>> {
+        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.get(name).cloned().ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, name.to_string()))
+    }
+
+    fn put(&self, name: &str, bytes: &[u8]) -> io::Result<()> {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.insert(name.to_string(), bytes.to_vec());
+        Ok(())
+    }
+}

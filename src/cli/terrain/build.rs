@@ -1,0 +1,268 @@
+//! `progmesh terrain build GRID OUT.pm`.
+
+use super::input::GridInput;
+use crate::cli::Failure;
+use crate::cli::args;
+use crate::cli::common::{self, Warnings, print_json, short, thousands};
+use crate::cli::control::{Interrupt, Progress};
+use progmesh::blocks::{self, BuildError, Built, Options};
+use progmesh::io::files::{self, WorkFolder};
+use progmesh::io::grid::GridFile;
+use progmesh::io::pm::{Terrain, encode_terrain};
+use progmesh::terrain::block::BlockError;
+use progmesh::terrain::tin;
+use serde::Serialize;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Make a progressive terrain of a height grid of any size, for views that refine it where they look (`fly`, `extract`).
+///
+/// The grid is simplified in blocks whose borders stay, which are joined 2 x 2, their seams freed, and simplified again, up to one of two triangles (Hoppe 1998). The error of every split is a bound on the difference of
+/// height to the grid's samples, proven whatever is refined around it. Heights are read window by window. Finished blocks are put aside in a folder
+/// beside OUT.pm: after an interruption the same command goes on where it was.
+#[derive(clap::Args, Debug)]
+#[command(after_help = "\
+Examples:
+  progmesh terrain build alps.tif alps.pm
+  progmesh terrain build etopo5.tif world.pm --floor 20 --json
+  progmesh terrain build dem.raw dem.pm --size 16385x16385 --type u16 --floor 3 --memory 256
+  progmesh fly alps.pm --path circle --tau 1")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    input: GridInput,
+    /// The file to write, .pm
+    #[arg(value_name = "OUT.pm", required = true)]
+    output: PathBuf,
+    /// At full detail no sample is farther than this from the mesh, vertically, in the grid's units; at 0 every sample is a vertex
+    #[arg(long, value_name = "E", value_parser = args::not_negative, allow_negative_numbers = true,
+          default_value_t = 0.0, help_heading = "Blocks")]
+    floor: f64,
+    /// Steps along a side of the finest blocks, 8 to 4096
+    #[arg(long, value_name = "N", value_parser = side, allow_negative_numbers = true, default_value_t = 256,
+          help_heading = "Blocks")]
+    block: usize,
+    /// Hold about so much of heights and blocks at once
+    #[arg(long, value_name = "MIB", value_parser = memory, allow_negative_numbers = true, default_value_t = 384,
+          help_heading = "Blocks")]
+    memory: usize,
+    /// Threads to use; the result does not depend on it [default: all]
+    #[arg(long, value_name = "N", value_parser = args::threads, allow_negative_numbers = true)]
+    threads: Option<usize>,
+    /// Print one JSON object about the run on standard output (see docs/json.md)
+    #[arg(long)]
+    json: bool,
+    /// Say nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+fn side(text: &str) -> Result<usize, String> {
+    match args::whole(text) {
+        Ok(n @ 8..=4096) => Ok(n),
+        _ => Err("must be a whole number from 8 to 4096".into()),
+    }
+}
+
+fn memory(text: &str) -> Result<usize, String> {
+    match args::whole(text) {
+        Ok(n @ 16..=1_048_576) => Ok(n),
+        _ => Err("must be a whole number of MiB, 16 or more".into()),
+    }
+}
+
+/// `OUT.pm.work`.
+fn work_folder(output: &Path) -> PathBuf {
+    let mut name = OsString::from(output);
+    name.push(".work");
+    name.into()
+}
+
+impl Args {
+    pub(crate) fn run(self) -> Result<(), Failure> {
+        let start = Instant::now();
+        let out = self.output.display().to_string();
+        if files::is_dash(&self.output) {
+            return Err(Failure::Usage("a progressive terrain is written to a file, not to standard output".into()));
+        }
+        if !self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("pm")) {
+            return Err(Failure::Usage(format!("{out}: a progressive mesh's name must end in .pm")));
+        }
+        common::check_target(&self.output)?;
+        let file = self.input.name();
+        let mut warnings = Warnings::new(self.quiet);
+        let interrupt = Interrupt::watch();
+        let report = common::in_pool(self.threads, || {
+            let source = self.input.open(&mut warnings)?;
+            let read = start.elapsed().as_secs_f64();
+            let path = work_folder(&self.output);
+            let in_folder = |e| Failure::Output(format!("{}: {e}", path.display()));
+            let belongs = self.belongs(&source)?;
+            let folder = WorkFolder::open(&path, &belongs).map_err(in_folder)?;
+            interrupt.be_graceful();
+            let options = Options::default()
+                .with_floor(self.floor)
+                .with_cells(self.block)
+                .with_memory(self.memory << 20);
+            let progress = Progress::new(&interrupt, self.quiet, "building");
+            let building = Instant::now();
+            let built = blocks::build(&*source.raster, &options, &folder, &Watch(&progress))
+                .map_err(|e| failure(&file, &path, &e))?;
+            drop(progress);
+            let build = building.elapsed().as_secs_f64();
+            let encoding = Instant::now();
+            let terrain = terrain(&source, &built, self.block);
+            let bytes =
+                encode_terrain(&built, &terrain).map_err(|e| Failure::Output(format!("{out}: {e}")))?;
+            let encode = encoding.elapsed().as_secs_f64();
+            if interrupt.is_set() {
+                return Err(Failure::Interrupted);
+            }
+            let writing = Instant::now();
+            common::write_bytes(&self.output, &bytes)?;
+            folder.remove().map_err(in_folder)?;
+            Ok(Report {
+                command: "terrain build",
+                file: file.clone(),
+                columns: terrain.columns as usize,
+                rows: terrain.rows as usize,
+                floor: self.floor,
+                error: built.error,
+                block: self.block,
+                levels: built.levels,
+                blocks: built.blocks,
+                blocks_found: built.found,
+                vertices: built.mesh.vertices(),
+                triangles: built.mesh.faces(),
+                base_triangles: built.mesh.base_faces.len(),
+                splits: built.mesh.splits.len(),
+                bytes: bytes.len(),
+                peak_bytes: files::peak_bytes(),
+                seconds: Seconds {
+                    read,
+                    build,
+                    encode,
+                    write: writing.elapsed().as_secs_f64(),
+                    total: start.elapsed().as_secs_f64(),
+                },
+                warnings: vec![],
+            })
+        })?;
+        let report = Report { warnings: warnings.all, ..report };
+        if !self.quiet {
+            common::note(&report.text());
+        }
+        if self.json { print_json(&report) } else { Ok(()) }
+    }
+
+    /// What finished blocks belong to: grid, options that change them, and this version.
+    fn belongs(&self, source: &GridFile) -> Result<String, Failure> {
+        Ok(format!(
+            "progmesh {} terrain build\n{}\n{} x {}\nfloor {:?} block {} memory {}\n",
+            env!("CARGO_PKG_VERSION"),
+            self.input.identity()?,
+            source.raster.columns(),
+            source.raster.rows(),
+            self.floor,
+            self.block,
+            self.memory
+        ))
+    }
+}
+
+fn terrain(source: &GridFile, built: &Built, block: usize) -> Terrain {
+    let (columns, rows) = (source.raster.columns(), source.raster.rows());
+    Terrain {
+        columns: columns as u32,
+        rows: rows as u32,
+        spacing: source.georeference.spacing_metres(columns, rows).unwrap_or_default(),
+        error: built.error,
+        cells: block as u32,
+        levels: built.levels,
+    }
+}
+
+fn failure(file: &str, folder: &Path, e: &BuildError) -> Failure {
+    match e {
+        BuildError::Cancelled => Failure::Interrupted,
+        BuildError::Store(e) => Failure::Output(format!(
+            "{}: {e}; if it stays so, remove that folder, and the work begins anew",
+            folder.display()
+        )),
+        // Errors of reading name the file already.
+        BuildError::Block(BlockError::Raster(e)) => Failure::Input(e.to_string()),
+        e => Failure::Input(format!("{file}: {e}")),
+    }
+}
+
+/// The progress bar, as `blocks` knows one.
+struct Watch<'a>(&'a Progress<'a>);
+
+impl tin::Control for Watch<'_> {
+    fn progress(&self, done: f64) {
+        progmesh::simplify::Control::progress(self.0, done);
+    }
+
+    fn cancelled(&self) -> bool {
+        progmesh::simplify::Control::cancelled(self.0)
+    }
+}
+
+/// The schema of `terrain build --json`; docs/json.md says what each field means.
+#[derive(Serialize)]
+struct Report {
+    command: &'static str,
+    file: String,
+    columns: usize,
+    rows: usize,
+    floor: f64,
+    error: f64,
+    block: usize,
+    levels: u32,
+    blocks: usize,
+    blocks_found: usize,
+    vertices: usize,
+    triangles: usize,
+    base_triangles: usize,
+    splits: usize,
+    bytes: usize,
+    peak_bytes: Option<u64>,
+    seconds: Seconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Seconds {
+    read: f64,
+    build: f64,
+    encode: f64,
+    write: f64,
+    total: f64,
+}
+
+impl Report {
+    fn text(&self) -> String {
+        let t = &self.seconds;
+        let found = match self.blocks_found {
+            0 => String::new(),
+            n => format!(" ({} of them found done)", thousands(n)),
+        };
+        format!(
+            "{}: {} x {} samples in {} blocks{found} -> base of {} triangles and {} splits to {}, error {}; {} bytes, {:.3} s (read {:.3}, build {:.3}, encode {:.3}, write {:.3})",
+            self.file,
+            thousands(self.columns),
+            thousands(self.rows),
+            thousands(self.blocks),
+            thousands(self.base_triangles),
+            thousands(self.splits),
+            thousands(self.triangles),
+            short(self.error),
+            thousands(self.bytes),
+            t.total,
+            t.read,
+            t.build,
+            t.encode,
+            t.write
+        )
+    }
+}

@@ -1,0 +1,89 @@
+//! Progressive terrains as `.pm` files.
+
+use super::write_shell;
+use crate::blocks::Built;
+use crate::progressive::shell_of;
+use crate::refine::format::{self, ChunkType, EncodeOptions};
+use crate::scene::{Scene, SceneMesh};
+
+/// What a mesh is of a height grid: a `TERR` chunk. The mesh has x = column, y = height, z = row.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Terrain {
+    /// Samples in a row.
+    pub columns: u32,
+    /// Samples in a column.
+    pub rows: u32,
+    /// Metres from column to column and from row to row; 0 where nobody knows.
+    pub spacing: [f64; 2],
+    /// The greatest difference of height between a sample and full detail.
+    pub error: f64,
+    /// Steps along a side of the finest blocks.
+    pub cells: u32,
+    /// Levels of blocks.
+    pub levels: u32,
+}
+
+/// Bytes of one.
+const BYTES: usize = 40;
+
+impl Terrain {
+    /// As a `TERR` chunk has it.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut out = Vec::with_capacity(BYTES);
+        for x in [self.columns, self.rows] {
+            out.extend_from_slice(&x.to_le_bytes());
+        }
+        for x in [self.spacing[0], self.spacing[1], self.error] {
+            out.extend_from_slice(&x.to_le_bytes());
+        }
+        for x in [self.cells, self.levels] {
+            out.extend_from_slice(&x.to_le_bytes());
+        }
+        out
+    }
+
+    /// From what a `TERR` chunk has; more than this program knows is skipped. `None` if there is less, or numbers that cannot be.
+    pub fn from_bytes(bytes: &[u8]) -> Option<Terrain> {
+        let bytes: &[u8; BYTES] = bytes.first_chunk()?;
+        let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
+        let long = |at: usize| f64::from_bits(u64::from(word(at)) | u64::from(word(at + 4)) << 32);
+        let t = Terrain {
+            columns: word(0),
+            rows: word(4),
+            spacing: [long(8), long(16)],
+            error: long(24),
+            cells: word(32),
+            levels: word(36),
+        };
+        let sound = |x: f64| x >= 0.0 && x.is_finite();
+        (t.columns > 1 && t.rows > 1 && [t.spacing[0], t.spacing[1], t.error].into_iter().all(sound)).then_some(t)
+    }
+}
+
+/// Writes a progressive terrain, in chunks that are read alone.
+///
+/// Errors: none that a terrain just built could have.
+pub fn encode_terrain(built: &Built, terrain: &Terrain) -> Result<Vec<u8>, format::EncodeError> {
+    let mesh = SceneMesh { name: Some("terrain".into()), ..SceneMesh::default() };
+    let shell = write_shell(&shell_of(Scene::from_mesh(mesh)), &[]);
+    let options =
+        EncodeOptions::default().with_pages(true).with_other(ChunkType::TERRAIN, 0, terrain.to_bytes());
+    format::encode(std::slice::from_ref(&built.mesh), &[], &shell, &options)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read() {
+        let t = Terrain { columns: 9, rows: 7, spacing: [30.0, 29.5], error: 0.5, cells: 256, levels: 1 };
+        let mut bytes = t.to_bytes();
+        assert_eq!(Terrain::from_bytes(&bytes), Some(t));
+        assert!((0..bytes.len()).all(|n| Terrain::from_bytes(&bytes[..n]).is_none()));
+        bytes.push(1);
+        assert_eq!(Terrain::from_bytes(&bytes), Some(t));
+        bytes[0] = 1;
+        assert_eq!(Terrain::from_bytes(&bytes), None);
+    }
+}
