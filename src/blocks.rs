@@ -71,7 +71,9 @@ pub use crate::terrain::tin::Control;
 #[non_exhaustive]
 pub enum BuildError {
     /// The grid has no cell, or blocks have none, or more samples than ids can name.
-    #[error("{columns} x {rows} samples in blocks of {cells}: at least 2 x 2 samples are needed, and blocks of 2 to 16,384 steps")]
+    #[error(
+        "{columns} x {rows} samples in blocks of {cells}: at least 2 x 2 samples are needed, and blocks of 2 to 16,384 steps"
+    )]
     Layout {
         /// Samples in a row.
         columns: usize,
@@ -93,7 +95,9 @@ pub enum BuildError {
     #[error("the work folder: {0}")]
     Store(#[from] std::io::Error),
     /// More triangles than a progressive mesh can number.
-    #[error("{0} triangles are more than a progressive mesh can number (2^29); a larger --floor leaves fewer")]
+    #[error(
+        "{0} triangles are more than a progressive mesh can number (2^29); a larger --floor leaves fewer"
+    )]
     TooLarge(u64),
     /// Stopped by [`Control::cancelled`]. Finished blocks are in the store.
     #[error("cancelled")]
@@ -110,10 +114,8 @@ impl From<RasterError> for BuildError {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Built {
-    /// The mesh. The errors of its splits are bounds on differences of height, proven for every order of refinement.
+    /// The mesh, with bounds on differences of height that are proven for every order of refinement.
     pub mesh: ProgressiveMesh,
-    /// The radius of a sphere about the vertex of each split within which its bound holds; none is smaller than what it must hold for splits below.
-    pub radii: Vec<f32>,
     /// The greatest difference of height between a sample and full detail.
     pub error: f64,
     /// Levels of blocks.
@@ -257,13 +259,17 @@ impl Work<'_> {
             return Err(BuildError::Nothing);
         }
         self.control.progress(1.0);
-        let (mesh, radii) = assembly.finish();
-        Ok(Built { mesh, radii, error, levels, blocks, found })
+        let mesh = assembly.finish().map_err(|e| damaged_by(e.to_string()))?;
+        Ok(Built { mesh, error, levels, blocks, found })
     }
 }
 
 fn damaged(e: crate::terrain::block::Damaged) -> BuildError {
-    BuildError::Store(std::io::Error::new(std::io::ErrorKind::InvalidData, e))
+    damaged_by(e.to_string())
+}
+
+fn damaged_by(what: String) -> BuildError {
+    BuildError::Store(std::io::Error::new(std::io::ErrorKind::InvalidData, what))
 }
 
 /// The blocks that one is joined of, in rows.

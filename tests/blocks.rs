@@ -88,7 +88,7 @@ fn it_can_be_written_so_that_chunks_are_read_alone() {
 fn bounds_hold_in_views() {
     let grid = landscape(49, 49, false);
     let built = build(&grid, &Options::default().with_cells(16), &InMemory::default(), &Quiet).unwrap();
-    let (pm, radii) = (Arc::new(built.mesh), built.radii);
+    let pm = Arc::new(built.mesh);
     let options = hierarchy::Options { rounds: 0, ..Default::default() };
     let hierarchy = Arc::new(Hierarchy::new(pm.clone(), &options).unwrap());
     let n = pm.splits.len();
@@ -123,8 +123,10 @@ fn bounds_hold_in_views() {
                     }
                     let at = glam::DVec3::new(fx, y, fz);
                     let bound = (0..n)
-                        .filter(|&i| !view.is_applied(i) && places[i].distance(at) <= f64::from(radii[i]) * 1.000001)
-                        .map(|i| f64::from(pm.splits.error[i]))
+                        .filter(|&i| {
+                            !view.is_applied(i) && places[i].distance(at) <= hierarchy.bounds(i).radius
+                        })
+                        .map(|i| hierarchy.bounds(i).error)
                         .fold(0.0, f64::max);
                     assert!(miss <= bound + 1e-9, "{miss} at {x}, {z}: {bound}");
                 }

@@ -1041,6 +1041,56 @@ struct TerrainSeconds {
     total: f64,
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(dead_code)]
+struct TerrainBuild {
+    command: String,
+    file: String,
+    columns: usize,
+    rows: usize,
+    floor: f64,
+    error: f64,
+    block: usize,
+    levels: u32,
+    blocks: usize,
+    blocks_found: usize,
+    vertices: usize,
+    triangles: usize,
+    base_triangles: usize,
+    splits: usize,
+    bytes: usize,
+    #[serde(deserialize_with = "present")]
+    peak_bytes: Option<u64>,
+    seconds: TerrainBuildSeconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(dead_code)]
+struct TerrainBuildSeconds {
+    read: f64,
+    build: f64,
+    encode: f64,
+    write: f64,
+    total: f64,
+}
+
+/// Of the same grid, in two blocks.
+const BUILD: &str = "terrain build grid.raw built.pm --size 12x10 --type u8 --block 10 --json";
+
+#[test]
+fn terrain_build() {
+    let p = Place::new();
+    terrain(&p);
+    let built: TerrainBuild = serde_json::from_str(&p.done(BUILD).stdout).unwrap();
+    assert_eq!((built.columns, built.rows, built.block, built.vertices), (12, 10, 10, 120));
+    assert_eq!((built.levels, built.blocks, built.blocks_found), (2, 3, 0));
+    assert_eq!((built.command.as_str(), built.triangles, built.base_triangles), ("terrain build", 198, 2));
+    assert_eq!((built.splits, built.error), (116, 0.0));
+}
+
 /// Twelve columns and ten rows of 8-bit heights.
 const TERRAIN: &str = "terrain tin grid.raw out.glb --size 12x10 --type u8 --max-error 3 --verify --json";
 
@@ -1164,6 +1214,7 @@ fn every_field_is_documented() {
         "generate terrain t.tif --size 9 --json",
         "terrain info t.tif --json",
         TERRAIN,
+        BUILD,
     ];
     for object in others.map(|a| p.done(a).json()).into_iter().chain([simplified]) {
         let mut values = vec![&object];

@@ -3,8 +3,10 @@
 use super::BuildError;
 use crate::aif::Positions;
 use crate::refine::ProgressiveMesh;
-use crate::refine::progressive::{SplitCode, SplitKind, SplitParts};
+use crate::refine::hierarchy::{Bounds, Guarantee};
+use crate::refine::progressive::{Damage, SplitCode, SplitKind, SplitParts};
 use crate::terrain::block::{Block, Collapse, NONE, Sheet, Vertex};
+use std::sync::Arc;
 
 /// The numbers, in the whole, of a sheet's vertices and faces.
 #[derive(Clone, Debug, Default)]
@@ -129,10 +131,14 @@ impl Assembly {
         }
     }
 
-    pub(super) fn finish(mut self) -> (ProgressiveMesh, Vec<f32>) {
+    pub(super) fn finish(mut self) -> Result<ProgressiveMesh, Damage> {
         self.mesh.new_positions = Positions::F32(self.places);
         self.mesh.levels = vec![0, self.mesh.splits.len() as u32];
         self.mesh.levels.dedup();
-        (self.mesh, self.radii)
+        let errors: Vec<f64> = self.mesh.splits.error.iter().map(|&e| f64::from(e)).collect();
+        let radii: Vec<f64> = self.radii.iter().map(|&r| f64::from(r)).collect();
+        let bounds = Bounds::with_errors_within(&self.mesh, &errors, &radii, Guarantee::Vertical)?;
+        self.mesh.bounds = Some(Arc::new(bounds));
+        Ok(self.mesh)
     }
 }

@@ -172,7 +172,12 @@ pub fn encode(
         all.push(part(ChunkType::SCENE, false, u32::MAX, scene.len() as u64, scene.to_vec()));
     }
     // They may tell what to do with the splits.
-    all.extend(options.others.iter().map(|(kind, m, bytes)| part(*kind, false, *m, bytes.len() as u64, bytes.clone())));
+    all.extend(
+        options
+            .others
+            .iter()
+            .map(|(kind, m, bytes)| part(*kind, false, *m, bytes.len() as u64, bytes.clone())),
+    );
     all.extend(interleave(chunks));
     all.extend(orders);
     let mut directory =

@@ -116,6 +116,37 @@ impl Bounds {
         Ok(bounds)
     }
 
+    /// As [`Bounds::with_errors`], where an error holds farther away than the faces of the finest mesh around what comes of the vertex: `radii[i]` at least from where split `i` is, model
+    /// units. Spheres are raised to hold that, and those below them. O(n).
+    ///
+    /// Errors: as [`Bounds::with_errors`], and not one radius for each split.
+    pub fn with_errors_within(
+        mesh: &ProgressiveMesh,
+        errors: &[f64],
+        radii: &[f64],
+        guarantee: Guarantee,
+    ) -> Result<Bounds, Damage> {
+        if radii.len() != mesh.splits.len() {
+            return Err(Damage::Length { what: "radii", len: radii.len(), want: mesh.splits.len() });
+        }
+        let mut bounds = Bounds::with_errors(mesh, errors, guarantee)?;
+        let forest = super::Forest::new(mesh);
+        let centre =
+            |b: &Bounds, i: usize| b.place(mesh, &forest, forest.parent[i], mesh.splits.vertex[i]).as_dvec3();
+        // As of the spheres: rounding of centres never shows.
+        let slack = bounds.diagonal * 1e-6;
+        let mut least: Vec<f64> = radii.iter().map(|r| r.max(0.0) + slack).collect();
+        for i in (0..least.len()).rev() {
+            bounds.of[i].radius = bounds.of[i].radius.max(pack_up(least[i]));
+            let up = forest.maker(forest.parent[i]) as usize;
+            if let Some(above) = least.get_mut(up) {
+                let reach = centre(&bounds, i).distance(centre(&bounds, up)) + bounds.radius(i) + slack;
+                *above = above.max(reach);
+            }
+        }
+        Ok(bounds)
+    }
+
     /// Keeps errors, raised to nest.
     pub(crate) fn set_errors(&mut self, forest: &super::Forest, mut errors: Vec<f64>) {
         for i in (0..errors.len()).rev() {

@@ -83,7 +83,9 @@ impl Args {
         let start = Instant::now();
         let out = self.output.display().to_string();
         if files::is_dash(&self.output) {
-            return Err(Failure::Usage("a progressive terrain is written to a file, not to standard output".into()));
+            return Err(Failure::Usage(
+                "a progressive terrain is written to a file, not to standard output".into(),
+            ));
         }
         if !self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("pm")) {
             return Err(Failure::Usage(format!("{out}: a progressive mesh's name must end in .pm")));
@@ -107,7 +109,7 @@ impl Args {
             let progress = Progress::new(&interrupt, self.quiet, "building");
             let building = Instant::now();
             let built = blocks::build(&*source.raster, &options, &folder, &Watch(&progress))
-                .map_err(|e| failure(&file, &path, &e))?;
+                .map_err(|e| failure(&file, &path, self.quiet, &e))?;
             drop(progress);
             let build = building.elapsed().as_secs_f64();
             let encoding = Instant::now();
@@ -182,9 +184,17 @@ fn terrain(source: &GridFile, built: &Built, block: usize) -> Terrain {
     }
 }
 
-fn failure(file: &str, folder: &Path, e: &BuildError) -> Failure {
+fn failure(file: &str, folder: &Path, quiet: bool, e: &BuildError) -> Failure {
     match e {
-        BuildError::Cancelled => Failure::Interrupted,
+        BuildError::Cancelled => {
+            if !quiet {
+                let kept = folder.display();
+                common::note(&format!(
+                    "finished blocks are kept in {kept}: the same command goes on from there"
+                ));
+            }
+            Failure::Interrupted
+        }
         BuildError::Store(e) => Failure::Output(format!(
             "{}: {e}; if it stays so, remove that folder, and the work begins anew",
             folder.display()

@@ -56,7 +56,8 @@ impl Terrain {
             levels: word(36),
         };
         let sound = |x: f64| x >= 0.0 && x.is_finite();
-        (t.columns > 1 && t.rows > 1 && [t.spacing[0], t.spacing[1], t.error].into_iter().all(sound)).then_some(t)
+        (t.columns > 1 && t.rows > 1 && [t.spacing[0], t.spacing[1], t.error].into_iter().all(sound))
+            .then_some(t)
     }
 }
 

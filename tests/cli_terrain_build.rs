@@ -1,0 +1,93 @@
+//! `progmesh terrain build`, end to end.
+
+mod common;
+
+use common::Place;
+
+const RAW: &str = "--size 70x50 --type i16 --nodata -32768";
+
+/// Heights of a hilly raster of 70 x 50 samples, i16, with a lake of voids if told so.
+fn hills(lake: bool) -> Vec<u8> {
+    let height = |i: i32| {
+        let (x, y) = (f64::from(i % 70), f64::from(i / 70));
+        let h = 90.0 * (x * 0.11).sin() * (y * 0.13).cos() + 9.0 * (x * 1.3 + y).sin();
+        let void = lake && (x - 30.0).hypot(y - 20.0) < 7.0;
+        if void { i16::MIN } else { h as i16 }
+    };
+    (0..70 * 50).flat_map(|i| height(i).to_le_bytes()).collect()
+}
+
+fn place(lake: bool) -> Place {
+    let p = Place::new();
+    p.write("hills.raw", hills(lake));
+    p
+}
+
+#[test]
+fn a_terrain_is_read_wherever_a_mesh_is() {
+    for lake in [false, true] {
+        let p = place(lake);
+        let built = p.done(&format!("terrain build hills.raw hills.pm {RAW} --block 16 --json")).json();
+        assert_eq!((built["levels"].as_u64(), built["blocks"].as_u64()), (Some(4), Some(20 + 6 + 2 + 1)));
+        assert_eq!(built["error"].as_f64(), Some(0.0));
+        assert_eq!(p.files(), ["hills.pm", "hills.raw"]);
+        let triangles = built["triangles"].as_u64().unwrap();
+        assert!(lake || triangles == 2 * 69 * 49);
+        let info = p.done("info hills.pm --json").json();
+        assert_eq!(info["triangles"].as_u64(), Some(triangles));
+        p.done("decode hills.pm full.ply -q");
+        assert_eq!(p.info("full.ply")["triangles"].as_u64(), Some(triangles));
+        p.done("decode hills.pm coarse.ply --triangles 500 -q");
+        assert!(p.info("coarse.ply")["triangles"].as_u64().unwrap() <= 500 || lake);
+    }
+}
+
+#[test]
+fn a_floor_keeps_fewer_vertices_and_threads_do_not_show() {
+    let p = place(true);
+    let full = p.done(&format!("terrain build hills.raw full.pm {RAW} --block 16 --json")).json();
+    let rough =
+        p.done(&format!("terrain build hills.raw a.pm {RAW} --block 16 --floor 5 --threads 1 --json")).json();
+    assert!(rough["error"].as_f64().unwrap() <= 5.0);
+    assert!(rough["vertices"].as_u64().unwrap() * 3 < full["vertices"].as_u64().unwrap());
+    p.done(&format!("terrain build hills.raw b.pm {RAW} --block 16 --floor 5 --threads 3 -q"));
+    assert_eq!(p.read("a.pm"), p.read("b.pm"));
+}
+
+#[test]
+fn finished_blocks_are_not_made_again() {
+    let p = place(false);
+    let command = format!("terrain build hills.raw hills.pm {RAW} --block 16 --json");
+    p.done(&command);
+    let whole = p.read("hills.pm");
+    // A folder of another work goes.
+    std::fs::create_dir(p.path("hills.pm.work")).unwrap();
+    p.write("hills.pm.work/belongs-to", "other work");
+    p.write("hills.pm.work/0-0-0.block", "nothing");
+    assert_eq!(p.done(&command).json()["blocks_found"].as_u64(), Some(0));
+    assert!(!p.exists("hills.pm.work"));
+    // Where the file cannot be written after all, what was done stays.
+    std::fs::remove_file(p.path("hills.pm")).unwrap();
+    std::fs::create_dir(p.path("hills.pm.work")).unwrap();
+    p.write("hills.pm.work/notes.txt", "somebody's");
+    p.run(&command).failed(4, "was not made by this program");
+    std::fs::remove_file(p.path("hills.pm.work/notes.txt")).unwrap();
+    p.done(&command);
+    assert_eq!(p.read("hills.pm"), whole);
+}
+
+#[test]
+fn what_cannot_be_built_is_said() {
+    let p = place(false);
+    p.run(&format!("terrain build hills.raw hills.ply {RAW}")).failed(2, "must end in .pm");
+    p.run(&format!("terrain build hills.raw - {RAW}")).failed(2, "to a file");
+    p.run(&format!("terrain build hills.raw a.pm {RAW} --block 7")).failed(2, "from 8 to 4096");
+    p.run(&format!("terrain build hills.raw a.pm {RAW} --floor -1")).failed(2, "0 or more");
+    p.run("terrain build hills.raw a.pm --size 1x3500 --type i16").failed(3, "at least 2 x 2");
+    p.write("void.raw", vec![0u8; 200]);
+    p.run("terrain build void.raw a.pm --size 10x10 --type i16 --nodata 0")
+        .failed(3, "nothing to triangulate");
+    p.write("high.raw", (0..100).flat_map(|i| (1e30 + f64::from(i)).to_le_bytes()).collect::<Vec<_>>());
+    p.run("terrain build high.raw a.pm --size 10x10 --type f64 --floor 1").failed(3, "finer than f32");
+    p.done("terrain build high.raw a.pm --size 10x10 --type f64 -q");
+}
