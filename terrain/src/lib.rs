@@ -2,7 +2,7 @@
 //!
 //! A [`Grid`] holds samples of heights, some of them void; a [`Raster`] gives them window by window, so that one larger than memory
 //! never lies in it whole; a [`Mosaic`] is one raster of several. A [`Georeference`] says where they lie. Grids become triangulated irregular
-//! networks here; files are read elsewhere.
+//! networks here ([`tin`]), and [block hierarchies](block) for progressive terrains; files are read elsewhere.
 //!
 //! ```
 //! use progmesh_terrain::{Grid, Raster, Window};

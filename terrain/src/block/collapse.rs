@@ -154,17 +154,16 @@ impl Work<'_> {
 
     fn run(&mut self, most: usize) -> Vec<Collapse> {
         for u in 0..self.vertices.len() as u32 {
-            self.evaluate(u);
+            self.evaluate(u, None);
         }
         let mut collapses = vec![];
         let (mut room, mut inner) = ([vec![], vec![]], vec![]);
         while collapses.len() < most {
-            let Some(Reverse((_, _, u))) = self.queue.pop() else { break };
+            let Some(Reverse((cost, _, u))) = self.queue.pop() else { break };
             if self.surface.at[u as usize] == NONE || self.goal[u as usize] == NONE {
                 continue;
             }
-            if self.stale[u as usize] {
-                self.evaluate(u);
+            if self.stale[u as usize] && !self.evaluate(u, Some(cost)) {
                 continue;
             }
             collapses.push(self.commit(u, (&mut room, &mut inner)));
@@ -204,7 +203,7 @@ impl Work<'_> {
             if self.goal[n as usize] != NONE {
                 self.stale[n as usize] = true;
             } else {
-                self.evaluate(n);
+                self.evaluate(n, None);
             }
         }
         self.ring = ring;
@@ -219,12 +218,13 @@ impl Work<'_> {
         }
     }
 
-    /// Finds where `u` goes at the least cost, and puts it into the queue.
-    fn evaluate(&mut self, u: u32) {
+    /// Finds where `u` goes at the least cost, and puts it into the queue. But if it still goes where it was to go for at most `known`, bits of the cost that is the least of all, it
+    /// may at once: returns true then.
+    fn evaluate(&mut self, u: u32, known: Option<u32>) -> bool {
         self.stale[u as usize] = false;
         let before = std::mem::replace(&mut self.goal[u as usize], NONE);
         if self.kind[u as usize] != Kind::Free || self.surface.at[u as usize] == NONE {
-            return;
+            return false;
         }
         let mut ring = std::mem::take(&mut self.other);
         self.surface.ring(u, &mut ring);
@@ -239,6 +239,11 @@ impl Work<'_> {
                 && (cost, ring.neighbours[i]) < (best, found)
             {
                 (best, found) = (cost, ring.neighbours[i]);
+                if found == before && known.is_some_and(|k| (cost.0 as f32).to_bits() <= k) {
+                    self.goal[u as usize] = found;
+                    self.other = ring;
+                    return true;
+                }
             }
         }
         self.other = ring;
@@ -246,6 +251,7 @@ impl Work<'_> {
             self.goal[u as usize] = found;
             self.queue.push(Reverse(((best.0 as f32).to_bits(), best.1, u)));
         }
+        false
     }
 
     /// Error and squared length of taking `u` to its neighbour number `i`; `None` if that is not legal, or dearer than `enough`.
