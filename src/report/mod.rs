@@ -7,6 +7,7 @@
 //!
 //! Not physically based, and no textures: a picture shows shape and material base colours.
 
+mod animation;
 mod clip;
 mod colormap;
 mod font;
@@ -17,14 +18,17 @@ pub mod plot;
 mod raster;
 mod relief;
 mod render;
+mod stroke;
 mod surface;
 mod table;
 mod view;
 
+pub use animation::apng;
 pub(crate) use colormap::linear;
 pub use colormap::{heat_bytes, heat_color};
 pub use heat::{Scale, Titles, heat_panels};
 pub use page::Page;
+pub(crate) use page::escaped;
 pub use picture::Picture;
 pub use relief::relief;
 pub use render::{Mask, Shading, Style, render, render_painted, silhouette};

@@ -79,7 +79,7 @@ impl Page {
 }
 
 /// Text as HTML has it.
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

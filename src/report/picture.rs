@@ -38,6 +38,11 @@ impl Picture {
         Some([self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]])
     }
 
+    /// Red, green and blue of every pixel, rows from the top.
+    pub(super) fn rgb(&self) -> &[u8] {
+        &self.rgb
+    }
+
     /// Colours a pixel; nothing happens outside.
     pub fn set(&mut self, x: u32, y: u32, color: [u8; 3]) {
         if let Some(at) = self.offset(x, y) {

@@ -162,6 +162,22 @@ impl View {
         self
     }
 
+    /// The same in a picture of so many pixels across, 1 to 16384, and as many down as keep its shape.
+    pub fn resized(mut self, width: u32) -> View {
+        let width = width.clamp(1, LARGEST);
+        let factor = f64::from(width) / f64::from(self.width);
+        self.height = ((f64::from(self.height) * factor).round() as u32).clamp(1, LARGEST);
+        self.width = width;
+        self.scale *= factor;
+        self
+    }
+
+    /// Where a point falls in the picture, pixels from the left and from the top, not limited to it; `None` at the eye and behind it, and too far away for numbers.
+    pub fn pixel(&self, p: DVec3) -> Option<[f64; 2]> {
+        let s = self.see(p).filter(|s| s.w > 0.0)?;
+        Some([0.5 * f64::from(self.width) + s.x / s.w, 0.5 * f64::from(self.height) + s.y / s.w])
+    }
+
     /// The same with a picture of `factor` times the sides.
     pub(super) fn enlarged(&self, factor: u32) -> View {
         let factor = factor.clamp(1, LARGEST / self.width.max(self.height));
@@ -283,6 +299,10 @@ mod tests {
                 let s = view.see(p).unwrap();
                 let seen = DVec2::new(150.0 + s.x / s.w, 100.0 + s.y / s.w);
                 assert!(seen.distance(pixel) < 1e-9, "{seen} {pixel}");
+                assert!(DVec2::from(view.pixel(p).unwrap()).distance(pixel) < 1e-9);
+                let half = view.clone().resized(150);
+                assert_eq!((half.width(), half.height()), (150, 100));
+                assert!(DVec2::from(half.pixel(p).unwrap()).distance(0.5 * pixel) < 1e-9);
             }
         }
     }
