@@ -5,6 +5,7 @@ use crate::aif::{MeshInput, Positions};
 use crate::scene::{Scene, SceneMesh};
 use crate::terrain::Grid;
 use crate::terrain::tin::Tin;
+use glam::{DMat4, DVec4};
 
 /// Where vertices stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +22,22 @@ pub enum Space {
 }
 
 impl Space {
+    /// From column, row and height to where they stand.
+    pub fn matrix(&self, grid: &Grid) -> DMat4 {
+        match *self {
+            Space::Grid => DMat4::IDENTITY,
+            Space::World { spacing: [x, z], exaggeration } => {
+                let [column, row] = middle(grid);
+                DMat4::from_cols(
+                    DVec4::new(x, 0.0, 0.0, 0.0),
+                    DVec4::new(0.0, 0.0, z, 0.0),
+                    DVec4::new(0.0, exaggeration, 0.0, 0.0),
+                    DVec4::new(-column * x, 0.0, -row * z, 1.0),
+                )
+            }
+        }
+    }
+
     /// Where a point of the grid stands.
     fn place(&self, grid: &Grid, [column, row]: [u32; 2], height: f64) -> [f64; 3] {
         let (column, row) = (f64::from(column), f64::from(row));
@@ -85,6 +102,7 @@ fn normal(grid: &Grid, column: usize, row: usize, spacing: [f64; 2], exaggeratio
 mod tests {
     use super::*;
     use crate::terrain::tin::{Options, Quiet, triangulate};
+    use glam::DVec3;
 
     fn slope() -> (Grid, Tin) {
         let grid = Grid::new(5, 3, (0..15).map(|i| f64::from(i % 5) * 2.0).collect()).unwrap();
@@ -108,6 +126,12 @@ mod tests {
         assert!(cross(&world)[1] > 0.0);
         let p = world.meshes[0].geometry.positions.get(0);
         assert_eq!([p.x, p.y, p.z], [-8.0, 0.0, -9.0]);
+        let space = Space::World { spacing: [4.0, 9.0], exaggeration: 2.0 };
+        for (i, &at) in tin.points.iter().enumerate() {
+            let p = world.meshes[0].geometry.positions.get(i);
+            let own = DVec3::new(at[0].into(), at[1].into(), tin.heights[i]);
+            assert!(space.matrix(&grid).transform_point3(own).distance(p) < 1e-4);
+        }
     }
 
     #[test]

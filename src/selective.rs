@@ -1,12 +1,22 @@
 //! A scene whose meshes are refined where a camera needs it.
 
 mod flight;
+mod heights;
 mod judge;
 mod morph;
+mod player;
+mod record;
+mod shot;
+mod terrain;
 
-pub use flight::{FlightPath, PathError, circle, lemniscate, recorded};
+pub use flight::{FlightPath, FrameSpace, PathError, circle, lemniscate, recorded};
+pub use heights::GroundJudgement;
 pub use judge::{Judge, Judgement};
 pub use morph::Geomorph;
+pub use player::player_page;
+pub use record::{FrameCounts, RecordError, Recorder, Recording, upward};
+pub use shot::{ShotStyle, shot};
+pub use terrain::{Ground, Lap};
 
 use crate::progressive::{Leftover, ProgressiveScene};
 use crate::refine::hierarchy::{Hierarchy, Options};
@@ -81,6 +91,12 @@ impl SelectiveScene {
     /// The views, one a mesh: what the last frame asked for.
     pub fn views(&self) -> &[View] {
         &self.views
+    }
+
+    /// Back to the bases, as if nothing had been shown. O(vertices of the finest meshes).
+    pub fn reset(&mut self) {
+        self.views.iter_mut().for_each(|v| *v = View::new(v.hierarchy().clone()));
+        self.set_geomorph(self.morphs.geomorph);
     }
 
     /// From the next frame on changes that can be seen show themselves so; `None`: at once. What is shown then is not [`SelectiveScene::views`] until they came

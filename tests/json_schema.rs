@@ -583,6 +583,12 @@ struct Fly {
     #[serde(deserialize_with = "present")]
     measured_over_tau: Option<FlyStatistics>,
     above: usize,
+    #[serde(deserialize_with = "present")]
+    cracks: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    folds: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    uncovered: Option<usize>,
     memory: FlyMemory,
     frames: Vec<FlyFrame>,
     seconds: FlySeconds,
@@ -625,6 +631,20 @@ struct FlyFrame {
     dirty_wedges: usize,
     #[serde(deserialize_with = "present")]
     measured: Option<FlyMeasured>,
+    #[serde(deserialize_with = "present")]
+    on_ground: Option<FlyOnGround>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlyOnGround {
+    samples: usize,
+    max_pixels: f64,
+    mean_pixels: f64,
+    max_height: f64,
+    uncovered: usize,
+    cracks: usize,
+    folds: usize,
 }
 
 #[derive(Deserialize)]
@@ -662,6 +682,22 @@ fn selective_commands_print_one_object_with_the_documented_fields() {
     .unwrap();
     assert_eq!((f.command.as_str(), f.frame_count, f.frames.len(), f.above), ("fly", 4, 4, 0));
     assert!(f.frames.iter().all(|f| f.morphing == 0) && f.morphing.max == 0.0);
+    assert!(
+        f.cracks.is_none()
+            && f.folds.is_none()
+            && f.uncovered.is_none()
+            && f.frames.iter().all(|f| f.on_ground.is_none())
+    );
+    p.done("generate terrain grid.tif --size 33 --seed 1 -q");
+    p.done("terrain tin grid.tif mesh.ply --max-error 0.5 --on-samples -q");
+    let g: Fly = serde_json::from_str(&of(
+        "fly mesh.ply --grid grid.tif --path circle --frames 2 --measure-every 1 --tau 0 --cull none --placement endpoint --lock-border --json",
+    ))
+    .unwrap();
+    let judged = g.frames[1].on_ground.as_ref().unwrap();
+    assert!(judged.samples > 0 && judged.mean_pixels <= judged.max_pixels && judged.max_height >= 0.0);
+    assert_eq!((judged.uncovered, judged.cracks, judged.folds), (0, 0, 0));
+    assert_eq!((g.cracks, g.folds, g.uncovered), (Some(0), Some(0), Some(0)));
     assert!(f.frames[2].measured.as_ref().is_some_and(|m| m.samples > 100) && f.frames[1].measured.is_none());
 }
 

@@ -1,51 +1,49 @@
 //! `progmesh fly IN --path PATH`.
 
+mod flight;
 mod geomorph;
+mod path;
+mod play;
 mod report;
+mod shots;
 
+use super::Failure;
 use super::args::{self, Input};
 use super::common::{self, Warnings};
 use super::control::Interrupt;
 use super::extract::{self, Needs};
 use super::method::Making;
-use super::{Failure, picture};
-use progmesh::io::files;
-use progmesh::refine::selective::{Limits, Regulator};
+use flight::{Setting, Step, fly};
+use glam::DVec3;
+use path::PathArgs;
+use play::PlayArgs;
 use progmesh::refine::view::Camera;
-use progmesh::report::{Picture, Style, Surface, View, render};
-use progmesh::selective::{FlightPath, Geomorph, Judge, SelectiveScene, circle, lemniscate, recorded};
-use report::{Frame, Measured, Memory, Report};
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use progmesh::selective::{Geomorph, Judge, SelectiveScene};
+use report::{Frame, Measured, Memory, OnGround, Report};
+use shots::ShotArgs;
 
 /// Fly a camera along a path, refine the mesh for every frame, and report what that took.
 ///
 /// Every frame starts from the mesh of the one before. Times are of refining alone, on one thread. What is measured is the largest
-/// lambda * distance / depth over samples of the input that the camera sees from their front, by code that shares nothing with what decides.
+/// lambda * distance / depth over samples of the input that the camera sees from their front, by code that shares nothing with what decides; of a terrain, with --grid,
+/// the largest distance in the picture between a sample and the surface above or below it.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "\
 Examples:
   progmesh fly dragon.ply --path circle --measure-every 50
   progmesh fly bunny.pm --path lemniscate --frames 2000 --budget-faces 20000 --json > flight.json
-  progmesh fly terrain.obj --path canyon.frames --path-scale 1024 --budget-us 500
-  progmesh fly scan.ply --path cams.json --png-every 60 --png-to shots
+  progmesh fly scan.ply --path cams.json --png-every 60 --png-to shots --apng flight.png
   progmesh fly dragon.ply --path circle --geomorph=time:20 --measure-every 10
+  progmesh fly dragon.ply --path circle --html dragon.html --html-taus 1,4
+  progmesh fly alps.pm --path lemniscate --grid alps.tif --path-speed fast --measure-every 10
+  progmesh fly terrain.obj --path canyon.frames --path-scale 1024 --budget-us 500
 
 Exit code 1 means: done, but the measured error came above --tau in a frame that had come to rest, with no vertex on the way.")]
 pub(crate) struct Args {
     #[command(flatten)]
     input: Input,
-    /// circle (one diagonal from the middle, looking at it), lemniscate (above, looking ahead), or a file: a JSON array of cameras (docs/camera.md), or lines
-    /// `F id front(3) left(3) up(3) eye(3) zoom`
-    #[arg(long, value_name = "PATH")]
-    path: String,
-    /// Frames of a circle or a lemniscate; of a file at most so many [default: 600, or all of the file]
-    #[arg(long, value_name = "N", value_parser = args::positive, allow_negative_numbers = true, help_heading = "Path")]
-    frames: Option<usize>,
-    /// Factor for the eye's coordinates of a file of `F` lines, which are of a terrain of side 1
-    #[arg(long, value_name = "S", value_parser = args::not_negative, default_value = "1",
-          allow_negative_numbers = true, help_heading = "Path")]
-    path_scale: f64,
+    #[command(flatten)]
+    path: PathArgs,
     #[command(flatten)]
     needs: Needs,
     /// End refining a frame after this many microseconds; the next goes on
@@ -69,18 +67,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = args::positive, default_value = "100000",
           allow_negative_numbers = true, help_heading = "Report")]
     samples: usize,
-    /// Draw every Kth frame, as the camera sees it
-    #[arg(long, value_name = "K", value_parser = args::positive, allow_negative_numbers = true, help_heading = "Report")]
-    png_every: Option<usize>,
-    /// Where pictures go: a directory, made if need be, for frame00000.png, ...
-    #[arg(
-        long,
-        value_name = "DIR",
-        default_value = "frames",
-        requires = "png_every",
-        help_heading = "Report"
-    )]
-    png_to: PathBuf,
+    #[command(flatten)]
+    shots: ShotArgs,
+    #[command(flatten)]
+    play: PlayArgs,
     #[command(flatten)]
     making: Making,
     /// Print one JSON object about the flight on standard output (see docs/json.md)
@@ -90,9 +80,6 @@ pub(crate) struct Args {
     #[arg(long, short)]
     quiet: bool,
 }
-
-/// Frames of a path that does not say.
-const FRAMES: usize = 600;
 
 fn hysteresis(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -106,39 +93,27 @@ impl Args {
         let mut warnings = Warnings::new(self.quiet);
         let file = self.input.name();
         // Before any work is done.
-        let bytes = match self.path.as_str() {
-            "circle" | "lemniscate" => Vec::new(),
-            path => files::read_all(Path::new(path)).map_err(|e| Failure::Input(format!("{path}: {e}")))?,
-        };
-        if self.png_every.is_some() {
-            picture::make_directory(&self.png_to)?;
-        }
+        let source = self.path.open(&mut warnings)?;
+        self.shots.check()?;
+        self.play.check()?;
         let interrupt = Interrupt::watch();
         let mut report = common::in_pool(self.making.collapsing.threads, || {
             let made = extract::make(&self.input, &self.making, self.quiet, &interrupt, &mut warnings)?;
-            let path = self.cameras(&made.scene, &bytes)?;
             let (seconds, mut scene) = ([made.read, made.bounds], made.scene);
+            let course = self.path.lay(&source, scene.bounds(), &file)?;
             scene.set_geomorph(self.geomorph);
-            let frames = self.fly(&mut scene, &path, &interrupt)?;
-            if frames.iter().all(|f| f.visible_vertices == 0) {
-                let (lo, hi) = scene.bounds().unwrap_or_default();
-                return Err(Failure::Input(format!(
-                    "{}: no frame sees anything of {file}, which reaches from {lo} to {hi}: the path is elsewhere \
-                     (--path-scale multiplies its coordinates)",
-                    self.path
-                )));
-            }
-            let [shared, shown, tables] = scene.bytes();
+            let report = self.fly(&mut scene, &course, &interrupt)?;
+            let [shared, shown, tables] = report.1;
             let vertices = scene.full_vertices();
-            let largest = frames.iter().map(|f| f.vertices).max().unwrap_or(0);
             let memory = Memory {
                 shared_bytes: shared,
                 shared_bytes_per_vertex: shared as f64 / vertices.max(1) as f64,
                 view_bytes: shown,
                 view_table_bytes: tables,
-                most_vertices: largest,
+                most_vertices: report.0.iter().map(|f| f.vertices).max().unwrap_or(0),
             };
-            Ok(Report::new(self.path.clone(), self.needs.tau, scene.full_faces(), frames, memory, seconds))
+            let path = self.path.name().to_string();
+            Ok(Report::new(path, self.needs.tau, scene.full_faces(), report.0, memory, seconds))
         })?;
         report.warnings = warnings.all;
         if !self.quiet {
@@ -155,96 +130,99 @@ impl Args {
         }
     }
 
-    fn cameras(&self, scene: &SelectiveScene, bytes: &[u8]) -> Result<FlightPath, Failure> {
-        let bounds = scene.bounds();
-        let file = self.input.name();
-        let Some((lo, hi)) = bounds.filter(|(lo, hi)| (*hi - *lo).length() > 0.0) else {
-            return Err(Failure::Input(format!("{file}: nothing is shown that one could fly about")));
-        };
-        let frames = self.frames.unwrap_or(FRAMES);
-        let path = match self.path.as_str() {
-            "circle" => circle((lo, hi), frames),
-            "lemniscate" => lemniscate((lo, hi), frames),
-            _ => recorded(bytes, self.path_scale, (hi - lo).length()),
-        };
-        let mut path = path.map_err(|e| Failure::Input(format!("{}: {e}", self.path)))?;
-        path.truncate(self.frames.unwrap_or(usize::MAX));
-        Ok(path)
+    /// That the path is where the scene is.
+    fn something_seen(&self, frames: &[Frame], bounds: Option<(DVec3, DVec3)>) -> Result<(), Failure> {
+        if frames.iter().any(|f| f.visible_vertices > 0) {
+            return Ok(());
+        }
+        let (lo, hi) = bounds.unwrap_or_default();
+        Err(Failure::Input(format!(
+            "{}: no frame sees anything of {}, which reaches from {lo} to {hi}: the path is elsewhere \
+             (--path-scale multiplies its coordinates)",
+            self.path.name(),
+            self.input.name()
+        )))
     }
 
+    fn setting<'a>(&'a self, tau: f64, interrupt: &'a Interrupt) -> Setting<'a> {
+        Setting {
+            tau,
+            cull: self.needs.cull(),
+            budget_faces: self.needs.budget_faces,
+            budget_us: self.budget_us,
+            hysteresis: self.hysteresis,
+            interrupt,
+        }
+    }
+
+    /// The flight that was asked for; then, for a page, the others. Returns the frames and the bytes held at the end of the first.
     fn fly(
         &self,
         scene: &mut SelectiveScene,
-        path: &[Camera],
+        course: &path::Course<'_>,
         interrupt: &Interrupt,
-    ) -> Result<Vec<Frame>, Failure> {
+    ) -> Result<(Vec<Frame>, [usize; 3]), Failure> {
         let file = self.input.name();
         let failed = |e: &dyn std::fmt::Display| Failure::Input(format!("{file}: {e}"));
-        let judge = match self.measure_every {
+        let judge = match self.measure_every.filter(|_| course.ground.is_none()) {
             Some(_) => Some(Judge::new(scene, self.samples).map_err(|e| failed(&e))?),
             None => None,
         };
-        let mut regulator = self.needs.budget_faces.map(|n| Regulator::new(n, self.needs.tau));
+        let path: &[Camera] = &course.cameras;
         let mut frames = Vec::with_capacity(path.len());
-        scene.take_changes();
-        for (k, camera) in path.iter().enumerate() {
-            if interrupt.is_set() {
-                return Err(Failure::Interrupted);
-            }
-            let tau = regulator.as_ref().map_or(self.needs.tau, |r| r.tau());
-            let start = Instant::now();
-            let end = self.budget_us.map(|us| start + Duration::from_micros(us as u64));
-            let expired = || end.is_some_and(|end| Instant::now() >= end);
-            let limits = Limits {
-                faces: self.needs.budget_faces.unwrap_or(usize::MAX),
-                expired: end.is_some().then_some(&expired as &dyn Fn() -> bool),
-                hysteresis: self.hysteresis,
-                ..Limits::default()
-            };
-            let done = scene.adapt(camera, tau, self.needs.cull(), &limits).map_err(|e| failed(&e))?;
-            let us = start.elapsed().as_secs_f64() * 1e6;
-            if let Some(r) = &mut regulator {
-                r.note(scene.needed_faces(), done.complete);
-            }
-            let changes = scene.take_changes();
-            let measured = match &judge {
-                Some(j) if k % self.measure_every.unwrap_or(1) == 0 => {
-                    let m = j.measure(scene, camera).map_err(|e| failed(&e))?;
+        let mut shots = self.shots.start(course);
+        let mut player = self.play.start(scene, path, &file);
+        if let Some(p) = &mut player {
+            p.begin(self.needs.tau, true)?;
+        }
+        fly(scene, path, &self.setting(self.needs.tau, interrupt), &file, &mut |step: &Step<'_>| {
+            let due = self.measure_every.is_some_and(|n| step.number % n == 0);
+            let measured = match judge.as_ref().filter(|_| due) {
+                Some(j) => {
+                    let m = j.measure(step.scene, step.camera).map_err(|e| failed(&e))?;
                     Some(Measured {
                         samples: m.visible,
                         max_pixels: m.max_pixels,
                         mean_pixels: m.mean_pixels,
                     })
                 }
-                _ => None,
+                None => None,
             };
-            if self.png_every.is_some_and(|n| k % n == 0) {
-                self.draw(scene, camera, k)?;
+            let ground = course.ground.as_ref().filter(|_| due);
+            let on_ground = ground.map(|g| OnGround::of(&g.judge(&step.scene.triangles(), step.camera)));
+            shots.take(step)?;
+            if let Some(p) = &mut player {
+                p.take(step)?;
             }
             frames.push(Frame {
-                faces: scene.face_count(),
-                vertices: scene.vertex_count(),
-                vsplits: done.splits,
-                ecols: done.collapses,
-                us,
-                tau: tau.is_finite().then_some(tau),
-                complete: done.complete,
-                morphing: scene.morphing(),
-                visible_vertices: scene.visible_vertices(camera),
-                dirty_index_bytes: changes.iter().map(|c| c.index_bytes()).sum(),
-                dirty_wedges: changes.iter().map(|c| c.wedges.len()).sum(),
+                faces: step.scene.face_count(),
+                vertices: step.scene.vertex_count(),
+                vsplits: step.done.splits,
+                ecols: step.done.collapses,
+                us: step.us,
+                tau: step.tau.is_finite().then_some(step.tau),
+                complete: step.done.complete,
+                morphing: step.scene.morphing(),
+                visible_vertices: step.scene.visible_vertices(step.camera),
+                dirty_index_bytes: step.changes.iter().map(|c| c.index_bytes()).sum(),
+                dirty_wedges: step.changes.iter().map(|c| c.wedges.len()).sum(),
                 measured,
+                on_ground,
             });
+            Ok(())
+        })?;
+        self.something_seen(&frames, scene.bounds())?;
+        let bytes = scene.bytes();
+        shots.write()?;
+        if let Some(mut p) = player {
+            for tau in self.play.others(self.needs.tau) {
+                scene.reset();
+                p.begin(tau, false)?;
+                let setting = self.setting(tau, interrupt);
+                fly(scene, path, &setting, &file, &mut |step: &Step<'_>| p.take(step))?;
+            }
+            p.write(scene)?;
         }
-        Ok(frames)
-    }
-
-    fn draw(&self, scene: &SelectiveScene, camera: &Camera, k: usize) -> Result<(), Failure> {
-        let failed = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", self.input.name()));
-        let surface = Surface::of(&scene.to_scene()).map_err(|e| failed(&e))?;
-        let picture: Picture = render(&surface, &View::of_camera(camera), &Style::default());
-        let path = self.png_to.join(format!("frame{k:05}.png"));
-        let bytes = picture.png().ok_or_else(|| failed(&"a picture could not be encoded"))?;
-        common::write_bytes(&path, &bytes)
+        Ok((frames, bytes))
     }
 }

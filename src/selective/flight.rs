@@ -2,7 +2,7 @@
 
 use crate::io::camera::{self, CameraFileError};
 use crate::refine::view::{Camera, CameraError, CameraParameters, Projection};
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 use std::f64::consts::TAU;
 
 /// A camera for every frame.
@@ -98,15 +98,32 @@ pub fn lemniscate((lo, hi): (DVec3, DVec3), frames: usize) -> Result<FlightPath,
     Ok((0..frames).map(frame).collect::<Result<_, _>>()?)
 }
 
+/// What the coordinates of `F` lines mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameSpace {
+    /// The eye's are multiplied by this.
+    pub scale: f64,
+    /// Then they are taken to the world, and directions with them. No scale in it.
+    pub to_world: DMat4,
+    /// Depths of the near and the far plane.
+    pub depths: [f64; 2],
+}
+
+impl FrameSpace {
+    /// Coordinates of the world, once multiplied by `scale`, about something so large: near and far are 0.001 and 10 times that.
+    pub fn about(extent: f64, scale: f64) -> FrameSpace {
+        FrameSpace { scale, to_world: DMat4::IDENTITY, depths: [1e-3 * extent, 10.0 * extent] }
+    }
+}
+
 /// Reads a path: a JSON array of cameras as in `CAM.json`; or lines `F id front(3) left(3) up(3) eye(3) zoom`, zoom being the tangent of half the angle across the
-/// shorter side of the picture, others ignored, with the eye's coordinates multiplied by `scale`. Of those the picture is 1920 x 1080, and `extent` times 0.001 and
-/// 10 are near and far.
+/// shorter side of the picture, others ignored. Of those the picture is 1920 x 1080, and `space` says what their coordinates mean; a camera of the array has its own.
 ///
 /// Errors: name the camera or the line.
-pub fn recorded(bytes: &[u8], scale: f64, extent: f64) -> Result<FlightPath, PathError> {
+pub fn recorded(bytes: &[u8], space: &FrameSpace) -> Result<FlightPath, PathError> {
     let text = String::from_utf8_lossy(bytes);
     let text = text.trim_start_matches('\u{feff}');
-    let path = if text.trim_start().starts_with('[') { cameras(text)? } else { frames(text, scale, extent)? };
+    let path = if text.trim_start().starts_with('[') { cameras(text)? } else { frames(text, space)? };
     if path.is_empty() { Err(PathError::Empty) } else { Ok(path) }
 }
 
@@ -122,7 +139,7 @@ fn cameras(text: &str) -> Result<FlightPath, PathError> {
     all.iter().enumerate().map(read).collect()
 }
 
-fn frames(text: &str, scale: f64, extent: f64) -> Result<FlightPath, PathError> {
+fn frames(text: &str, space: &FrameSpace) -> Result<FlightPath, PathError> {
     let mut path = Vec::new();
     for (k, line) in text.lines().enumerate() {
         let mut words = line.split_whitespace();
@@ -139,19 +156,21 @@ fn frames(text: &str, scale: f64, extent: f64) -> Result<FlightPath, PathError> 
         let [fx, fy, fz, _, _, _, ux, uy, uz, ex, ey, ez, zoom] = numbers[..] else {
             return Err(wrong(format!("{} numbers after the frame's, 13 are needed", numbers.len())));
         };
-        let eye = scale * DVec3::new(ex, ey, ez);
+        let eye = space.to_world.transform_point3(space.scale * DVec3::new(ex, ey, ez));
+        let [front, up] = [[fx, fy, fz], [ux, uy, uz]].map(|d| space.to_world.transform_vector3(d.into()));
+        let [near, far] = space.depths;
         let wide = SIDES[0] as f64 / SIDES[1] as f64;
         let camera = Camera::new(&CameraParameters {
             eye,
-            target: eye + extent * DVec3::new(fx, fy, fz),
-            up: DVec3::new(ux, uy, uz),
+            target: eye + far * front,
+            up,
             projection: Projection::Perspective {
                 fov_y_deg: 2.0 * (zoom / wide.min(1.0)).atan().to_degrees(),
             },
             width: SIDES[0],
             height: SIDES[1],
-            near: 1e-3 * extent,
-            far: 10.0 * extent,
+            near,
+            far,
         });
         path.push(camera.map_err(|e| wrong(e.to_string()))?);
     }
@@ -193,14 +212,15 @@ mod tests {
     #[test]
     fn recorded_paths_are_read_and_faults_are_named() {
         let line = "F 7  0.6 -0.8 0  0.8 0.6 0  0 0 1  -0.02 0.3 0.04  0.5\nf 0 0 0\n";
-        let path = recorded(line.as_bytes(), 10.0, 2.0).unwrap();
+        let path = recorded(line.as_bytes(), &FrameSpace::about(2.0, 10.0)).unwrap();
         assert_eq!(path.len(), 1);
         let c = &path[0];
         assert!((c.eye() - DVec3::new(-0.2, 3.0, 0.4)).length() < 1e-12);
         assert!((c.look() - DVec3::new(0.6, -0.8, 0.0)).length() < 1e-12);
         // Half the height at depth 1 is the zoom: the height is the shorter side.
         assert!((540.0 / c.pixel_scale() - 0.5).abs() < 1e-12);
-        let said = |text: &str| recorded(text.as_bytes(), 1.0, 1.0).unwrap_err().to_string();
+        let said =
+            |text: &str| recorded(text.as_bytes(), &FrameSpace::about(1.0, 1.0)).unwrap_err().to_string();
         assert!(said("F 0 1 2 3\n").contains("line 1: 3 numbers"));
         assert!(said("x\nF 0 a\n").contains("line 2: a"));
         assert!(said("nothing\n").contains("no frames"));
@@ -209,6 +229,6 @@ mod tests {
         assert!(said(&line.replace("0 0 1", "0.6 -0.8 0")).contains("up"));
         let camera = r#"[{"eye": [0, 0, 5], "target": [0, 0, 0], "up": [0, 1, 0], "fov_y_deg": 45,
             "width": 640, "height": 480, "near": 0.1, "far": 100}]"#;
-        assert_eq!(recorded(camera.as_bytes(), 1.0, 1.0).unwrap()[0].width(), 640);
+        assert_eq!(recorded(camera.as_bytes(), &FrameSpace::about(1.0, 1.0)).unwrap()[0].width(), 640);
     }
 }

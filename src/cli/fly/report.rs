@@ -1,6 +1,7 @@
 //! What a flight came to.
 
 use super::common::{short, thousands};
+use progmesh::selective::GroundJudgement;
 use serde::Serialize;
 
 /// The schema of `--json`; docs/json.md says what each field means.
@@ -20,6 +21,9 @@ pub(super) struct Report {
     operations_per_second: Option<f64>,
     measured_over_tau: Option<Statistics>,
     pub(super) above: usize,
+    cracks: Option<usize>,
+    folds: Option<usize>,
+    uncovered: Option<usize>,
     memory: Memory,
     frames: Vec<Frame>,
     seconds: Seconds,
@@ -41,6 +45,7 @@ pub(super) struct Frame {
     pub(super) dirty_index_bytes: usize,
     pub(super) dirty_wedges: usize,
     pub(super) measured: Option<Measured>,
+    pub(super) on_ground: Option<OnGround>,
 }
 
 #[derive(Clone, Copy, Serialize)]
@@ -48,6 +53,32 @@ pub(super) struct Measured {
     pub(super) samples: usize,
     pub(super) max_pixels: f64,
     pub(super) mean_pixels: f64,
+}
+
+/// A terrain against its grid.
+#[derive(Clone, Copy, Serialize)]
+pub(super) struct OnGround {
+    samples: usize,
+    max_pixels: f64,
+    mean_pixels: f64,
+    max_height: f64,
+    uncovered: usize,
+    cracks: usize,
+    folds: usize,
+}
+
+impl OnGround {
+    pub(super) fn of(j: &GroundJudgement) -> OnGround {
+        OnGround {
+            samples: j.samples,
+            max_pixels: j.max_pixels,
+            mean_pixels: j.mean_pixels,
+            max_height: j.max_height,
+            uncovered: j.uncovered,
+            cracks: j.cracks,
+            folds: j.folds,
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -105,10 +136,13 @@ impl Report {
         let time: f64 = later.iter().map(|f| f.us * 1e-6).sum();
         let ratio = |f: &Frame| {
             let tau = f.tau.filter(|t| *t > 0.0 && f.complete)?;
-            f.measured.map(|m| m.max_pixels / tau)
+            let pixels = f.measured.map(|m| m.max_pixels).or(f.on_ground.map(|g| g.max_pixels));
+            pixels.map(|p| p / tau)
         };
         // While vertices move nothing is promised.
         let above = frames.iter().filter(|f| f.morphing == 0).filter_map(ratio).filter(|r| *r > 1.0);
+        let judged = || frames.iter().filter_map(|f| f.on_ground.as_ref());
+        let sum = |f: &dyn Fn(&OnGround) -> usize| judged().next().map(|_| judged().map(f).sum());
         Report {
             command: "fly",
             path,
@@ -124,6 +158,9 @@ impl Report {
             operations_per_second: (operations > 0 && time > 0.0).then(|| operations as f64 / time),
             measured_over_tau: Statistics::of(frames.iter().filter_map(ratio)),
             above: above.count(),
+            cracks: sum(&|g| g.cracks),
+            folds: sum(&|g| g.folds),
+            uncovered: sum(&|g| g.uncovered),
             memory,
             seconds: Seconds { read, bounds },
             warnings: vec![],
@@ -154,6 +191,14 @@ impl Report {
         }
         if let Some(m) = &self.measured_over_tau {
             lines.push(s("measured error / tau", m));
+        }
+        if let (Some(cracks), Some(folds), Some(uncovered)) = (self.cracks, self.folds, self.uncovered) {
+            lines.push(format!(
+                "  {} cracks, {} folds, {} samples in sight that nothing covers",
+                thousands(cracks),
+                thousands(folds),
+                thousands(uncovered)
+            ));
         }
         lines.push(format!(
             "  shared {} B a vertex; a view {} B for {} vertices shown at most, and {} B of tables",

@@ -8,7 +8,7 @@ use progmesh::io::grid::{
     self, ByteOrder, Encoding, GridError, GridFile, GridFormat, GridOptions, SampleType,
 };
 use progmesh::terrain::{Grid, RasterError};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// `GRID` and how to read it.
 #[derive(clap::Args, Debug)]
@@ -135,6 +135,20 @@ impl GridInput {
         warnings.say(grid.warnings.iter().cloned());
         Ok(grid)
     }
+}
+
+/// Opens one grid whose format its bytes or its name tell.
+pub(crate) fn open_plain(path: &Path, warnings: &mut Warnings) -> Result<GridFile, Failure> {
+    let file = common::name(path, "standard input");
+    let grid = files::open_grid(path, &GridOptions::default()).map_err(|e| unopened(&file, &e))?;
+    warnings.say(grid.warnings.iter().map(|w| format!("{file}: {w}")));
+    Ok(grid)
+}
+
+/// Lengths of a step in metres, or in whatever unit the grid has.
+pub(crate) fn known_spacing(source: &GridFile) -> Option<[f64; 2]> {
+    let place = &source.georeference;
+    place.spacing_metres(source.raster.columns(), source.raster.rows()).or_else(|| place.spacing())
 }
 
 fn unopened(file: &str, e: &OpenGridError) -> Failure {

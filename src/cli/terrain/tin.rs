@@ -1,6 +1,6 @@
 //! `progmesh terrain tin GRID OUT`.
 
-use super::input::{GridInput, whole};
+use super::input::{GridInput, known_spacing, whole};
 use crate::cli::Failure;
 use crate::cli::args::{self, Output};
 use crate::cli::common::{self, Warnings, short, thousands};
@@ -307,12 +307,6 @@ impl Args {
             _ => Ok(()),
         }
     }
-}
-
-/// Lengths of a step in metres, or in whatever unit the grid has.
-fn known_spacing(source: &GridFile) -> Option<[f64; 2]> {
-    let place = &source.georeference;
-    place.spacing_metres(source.raster.columns(), source.raster.rows()).or_else(|| place.spacing())
 }
 
 /// How a picture shows it: with y up, and heights that show where no spacing is known.
