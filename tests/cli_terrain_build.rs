@@ -66,7 +66,7 @@ fn finished_blocks_are_not_made_again() {
     p.write("hills.pm.work/0-0-0.block", "nothing");
     assert_eq!(p.done(&command).json()["blocks_found"].as_u64(), Some(0));
     assert!(!p.exists("hills.pm.work"));
-    // Where the file cannot be written after all, what was done stays.
+    // What is somebody else's stays.
     std::fs::remove_file(p.path("hills.pm")).unwrap();
     std::fs::create_dir(p.path("hills.pm.work")).unwrap();
     p.write("hills.pm.work/notes.txt", "somebody's");
@@ -74,6 +74,38 @@ fn finished_blocks_are_not_made_again() {
     std::fs::remove_file(p.path("hills.pm.work/notes.txt")).unwrap();
     p.done(&command);
     assert_eq!(p.read("hills.pm"), whole);
+}
+
+#[test]
+fn a_run_that_was_killed_goes_on() {
+    let p = Place::new();
+    let heights = |i: u32| ((i % 300) * (i / 300) % 251 + i * 7919 % 13) as u8;
+    p.write("rough.raw", (0..90_000).map(heights).collect::<Vec<_>>());
+    let arguments = "terrain build rough.raw rough.pm --size 300x300 --type u8 --block 32 --json";
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_progmesh"))
+        .args(arguments.split(' '))
+        .current_dir(p.directory())
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    // Of a hundred blocks and what follows some are enough.
+    let done = || {
+        let files = std::fs::read_dir(p.path("rough.pm.work")).into_iter().flatten().flatten();
+        files.filter(|f| f.file_name().to_string_lossy().ends_with(".block")).count()
+    };
+    while done() < 3 && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(!p.exists("rough.pm"));
+    let again = p.done(arguments).json();
+    assert!(again["blocks_found"].as_u64().unwrap() >= 3);
+    assert!(!p.exists("rough.pm.work"));
+    let resumed = p.read("rough.pm");
+    assert_eq!(p.done(arguments).json()["blocks_found"].as_u64(), Some(0));
+    assert_eq!(p.read("rough.pm"), resumed);
 }
 
 #[test]
