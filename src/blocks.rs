@@ -3,7 +3,9 @@
 //! Blocks are made level by level, those of a level side by side; each goes to a [`Store`] when it is done, from where the next level takes what is left of it, and
 //! an interrupted run what it had done. At the end all collapses, the last first, are numbered as splits.
 //!
-//! The mesh has x = column, y = height, z = row, as they are; faces look up.
+//! What such a mesh takes to be numbered and written is in memory at once; blocks are not.
+//!
+//! The mesh has x = column, and y = height and z = row in the length of a step by a column; faces look up.
 
 mod number;
 mod store;
@@ -27,11 +29,13 @@ pub struct Options {
     /// About how many bytes of heights and blocks to hold at once. Above 16 of it a block has as many heights, it is measured against the least and greatest of squares of them,
     /// which makes bounds of the coarsest blocks a little larger.
     pub memory: usize,
+    /// Lengths of a step by a column and by a row, in the unit of heights.
+    pub spacing: [f64; 2],
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { floor: 0.0, cells: 256, memory: 384 << 20 }
+        Options { floor: 0.0, cells: 256, memory: 384 << 20, spacing: [1.0; 2] }
     }
 }
 
@@ -55,6 +59,18 @@ impl Options {
     pub fn with_memory(mut self, bytes: usize) -> Self {
         self.memory = bytes;
         self
+    }
+
+    /// With steps of this length by a column and by a row.
+    #[must_use]
+    pub fn with_spacing(mut self, spacing: [f64; 2]) -> Self {
+        self.spacing = spacing;
+        self
+    }
+
+    /// How long a step by a row and a unit of height are, in steps by a column.
+    fn scale(&self) -> [f64; 2] {
+        [self.spacing[1] / self.spacing[0], 1.0 / self.spacing[0]]
     }
 
     /// Heights, or cells of them, that one block is measured against.
@@ -82,6 +98,9 @@ pub enum BuildError {
         /// Steps along a side of a block.
         cells: usize,
     },
+    /// A spacing of no length.
+    #[error("steps by columns and rows must have a length above 0, and not out of all proportion")]
+    Spacing,
     /// A floor that is no number, or negative.
     #[error("a floor must be a number, 0 or more")]
     Floor,
@@ -116,7 +135,9 @@ impl From<RasterError> for BuildError {
 pub struct Built {
     /// The mesh, with bounds on differences of height that are proven for every order of refinement.
     pub mesh: ProgressiveMesh,
-    /// The greatest difference of height between a sample and full detail.
+    /// [`Options::spacing`].
+    pub spacing: [f64; 2],
+    /// The greatest difference of height between a sample and full detail, in the unit of heights.
     pub error: f64,
     /// Levels of blocks.
     pub levels: u32,
@@ -143,6 +164,11 @@ pub fn build(
     if !(options.floor >= 0.0 && options.floor.is_finite()) {
         return Err(BuildError::Floor);
     }
+    let scale = options.scale();
+    if !scale.into_iter().all(|s| (1e-12..1e12).contains(&s)) {
+        return Err(BuildError::Spacing);
+    }
+    let layout = layout.with_scale(scale);
     let levels = layout.levels();
     let total: usize = (0..levels).map(|l| layout.blocks(l).iter().product::<usize>()).sum();
     let work = Work { raster, layout, options, store, control };
@@ -236,7 +262,7 @@ impl Work<'_> {
     /// All splits, from the root down, each level row by row.
     fn number(&self, levels: u32, blocks: usize, found: usize) -> Result<Built, BuildError> {
         let root = self.sheet(levels - 1, [0, 0])?;
-        let (mut assembly, numbers) = Assembly::new(&root);
+        let (mut assembly, numbers) = Assembly::new(&root, self.options.scale());
         let mut here = vec![([0, 0], numbers)];
         let mut error = 0.0f64;
         for level in (0..levels).rev() {
@@ -259,8 +285,10 @@ impl Work<'_> {
             return Err(BuildError::Nothing);
         }
         self.control.progress(1.0);
-        let mesh = assembly.finish().map_err(|e| damaged_by(e.to_string()))?;
-        Ok(Built { mesh, error, levels, blocks, found })
+        let spacing = self.options.spacing;
+        let (mesh, rounding) = assembly.finish().map_err(|e| damaged_by(e.to_string()))?;
+        let error = error + rounding * spacing[0];
+        Ok(Built { mesh, spacing, error, levels, blocks, found })
     }
 }
 

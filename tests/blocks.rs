@@ -86,8 +86,16 @@ fn it_can_be_written_so_that_chunks_are_read_alone() {
 /// Any set of splits that a view may hold: at every sample the mesh is as near as the bounds of the splits not made say.
 #[test]
 fn bounds_hold_in_views() {
+    // Steps of rows half as long again as those of columns, which are 4 units of height.
+    bounds_hold_with([1.0, 1.0]);
+    bounds_hold_with([4.0, 6.0]);
+}
+
+fn bounds_hold_with(spacing: [f64; 2]) {
     let grid = landscape(49, 49, false);
-    let built = build(&grid, &Options::default().with_cells(16), &InMemory::default(), &Quiet).unwrap();
+    let options = Options::default().with_cells(16).with_spacing(spacing);
+    let built = build(&grid, &options, &InMemory::default(), &Quiet).unwrap();
+    let (step, unit) = (spacing[1] / spacing[0], 1.0 / spacing[0]);
     let pm = Arc::new(built.mesh);
     let options = hierarchy::Options { rounds: 0, ..Default::default() };
     let hierarchy = Arc::new(Hierarchy::new(pm.clone(), &options).unwrap());
@@ -109,15 +117,15 @@ fn bounds_hold_in_views() {
             };
             let area = side(v[0], v[1], v[2].x, v[2].z);
             let (lo, hi) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
-            for z in lo.z as usize..=hi.z as usize {
+            for z in (lo.z / step) as usize..=(hi.z / step) as usize {
                 for x in lo.x as usize..=hi.x as usize {
-                    let (fx, fz) = (x as f64, z as f64);
+                    let (fx, fz) = (x as f64, z as f64 * step);
                     let w = [side(v[1], v[2], fx, fz), side(v[2], v[0], fx, fz), side(v[0], v[1], fx, fz)];
                     if area == 0.0 || w.iter().any(|&w| w * area < 0.0) {
                         continue;
                     }
                     let y: f64 = (0..3).map(|k| w[k] / area * v[k].y).sum();
-                    let miss = (y - grid.height(x, z).unwrap()).abs();
+                    let miss = (y - grid.height(x, z).unwrap() * unit).abs();
                     if miss < 1e-9 {
                         continue;
                     }

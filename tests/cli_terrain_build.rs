@@ -109,6 +109,25 @@ fn a_run_that_was_killed_goes_on() {
 }
 
 #[test]
+fn flights_keep_the_tolerance_at_every_sample() {
+    let p = Place::new();
+    p.done("generate terrain grid.tif --size 65 --seed 3 -q");
+    p.done("terrain build grid.tif grid.pm --block 16 -q");
+    for path in ["circle", "lemniscate"] {
+        let fly = format!("fly grid.pm --grid grid.tif --path {path} --path-speed fast --frames 9");
+        let r = p.done(&format!("{fly} --tau 8 --cull frustum --measure-every 2 --json -q")).json();
+        let worst = r["measured_over_tau"]["max"].as_f64().unwrap();
+        assert!(worst > 0.0 && worst <= 1.0, "{worst}");
+        assert_eq!(
+            (r["above"].as_u64(), r["cracks"].as_u64(), r["uncovered"].as_u64()),
+            (Some(0), Some(0), Some(0))
+        );
+        // And not by showing everything.
+        assert!(r["faces"]["mean"].as_f64().unwrap() < 0.9 * r["full_faces"].as_f64().unwrap());
+    }
+}
+
+#[test]
 fn what_cannot_be_built_is_said() {
     let p = place(false);
     p.run(&format!("terrain build hills.raw hills.ply {RAW}")).failed(2, "must end in .pm");

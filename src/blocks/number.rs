@@ -20,7 +20,11 @@ pub(super) struct Numbers {
 pub(super) struct Assembly {
     pub mesh: ProgressiveMesh,
     radii: Vec<f32>,
-    places: Vec<[f32; 3]>,
+    places: Positions,
+    /// How long a step by a row and a unit of height are, in steps by a column.
+    scale: [f64; 2],
+    /// The greatest height in the mesh, without its sign.
+    greatest: f64,
     /// Vertices and faces so far.
     vertices: u32,
     faces: u32,
@@ -29,30 +33,51 @@ pub(super) struct Assembly {
 /// Faces that a progressive mesh can number.
 const MOST_FACES: u64 = 1 << 29;
 
-/// x = column, y = height, z = row.
-fn place(v: Vertex) -> [f32; 3] {
-    // Whole numbers below 2^24.
-    [v.x as f32, v.z, v.y as f32]
-}
-
 /// In the mesh rows run towards the viewer, so faces turn the other way: their corners 1 and 2 are exchanged. The same of sides.
 fn turned(side: u32) -> u32 {
     2 - side % 3
 }
 
 impl Assembly {
-    pub(super) fn new(root: &Sheet) -> (Self, Numbers) {
+    pub(super) fn new(root: &Sheet, scale: [f64; 2]) -> (Self, Numbers) {
         let numbers = Numbers {
             vertices: (0..root.vertices.len() as u32).collect(),
             faces: (0..root.faces.len() as u32).collect(),
         };
         let mesh = ProgressiveMesh {
             base_faces: root.faces.iter().map(|&[a, b, c]| [a, c, b]).collect(),
-            base_positions: Positions::F32(root.vertices.iter().map(|&v| place(v)).collect()),
             ..ProgressiveMesh::default()
         };
         let (vertices, faces) = (root.vertices.len() as u32, root.faces.len() as u32);
-        (Assembly { mesh, radii: vec![], places: vec![], vertices, faces }, numbers)
+        // Columns and rows are exact either way.
+        let places = if scale[0] == 1.0 { Positions::F32(vec![]) } else { Positions::F64(vec![]) };
+        let mut assembly = Assembly { mesh, radii: vec![], places, scale, greatest: 0.0, vertices, faces };
+        root.vertices.iter().for_each(|&v| assembly.place(v));
+        assembly.mesh.base_positions = assembly.places.clone();
+        match &mut assembly.places {
+            Positions::F32(p) => p.clear(),
+            Positions::F64(p) => p.clear(),
+        }
+        (assembly, numbers)
+    }
+
+    fn place(&mut self, v: Vertex) {
+        let p = [f64::from(v.x), f64::from(v.z) * self.scale[1], f64::from(v.y) * self.scale[0]];
+        self.greatest = self.greatest.max(p[1].abs());
+        match &mut self.places {
+            Positions::F32(all) => all.push(p.map(|x| x as f32)),
+            Positions::F64(all) => all.push(p),
+        }
+    }
+
+    /// What rounding has changed in heights at most, in the mesh.
+    fn rounding(&self) -> f64 {
+        match self.places {
+            Positions::F32(_) if self.scale[1] == 1.0 => 0.0,
+            Positions::F32(_) => self.greatest * f64::from(f32::EPSILON),
+            // Of places in the plan, too.
+            Positions::F64(_) => self.greatest * 1e-12,
+        }
     }
 
     /// Appends the splits of a block, of whose sheet the numbers are given; returns those of the sheets it was joined of.
@@ -68,7 +93,7 @@ impl Assembly {
         block.faces_left.iter().zip(left.faces).for_each(|(&f, n)| faces[f as usize] = n);
         for c in block.collapses.iter().rev() {
             self.split(c, &vertices, &mut faces);
-            self.places.push(place(block.vertices[c.removed as usize]));
+            self.place(block.vertices[c.removed as usize]);
             vertices[c.removed as usize] = self.vertices;
             self.vertices += 1;
         }
@@ -131,14 +156,21 @@ impl Assembly {
         }
     }
 
-    pub(super) fn finish(mut self) -> Result<ProgressiveMesh, Damage> {
-        self.mesh.new_positions = Positions::F32(self.places);
+    /// The mesh, and what rounding has changed in its heights at most.
+    pub(super) fn finish(mut self) -> Result<(ProgressiveMesh, f64), Damage> {
+        let rounding = self.rounding();
+        for e in &mut self.mesh.splits.error {
+            let bound = f64::from(*e) * self.scale[1] + rounding;
+            // Rounded up.
+            *e = if f64::from(bound as f32) < bound { (bound as f32).next_up() } else { bound as f32 };
+        }
+        self.mesh.new_positions = self.places;
         self.mesh.levels = vec![0, self.mesh.splits.len() as u32];
         self.mesh.levels.dedup();
         let errors: Vec<f64> = self.mesh.splits.error.iter().map(|&e| f64::from(e)).collect();
         let radii: Vec<f64> = self.radii.iter().map(|&r| f64::from(r)).collect();
         let bounds = Bounds::with_errors_within(&self.mesh, &errors, &radii, Guarantee::Vertical)?;
         self.mesh.bounds = Some(Arc::new(bounds));
-        Ok(self.mesh)
+        Ok((self.mesh, rounding))
     }
 }

@@ -1,6 +1,6 @@
 //! `progmesh terrain build GRID OUT.pm`.
 
-use super::input::GridInput;
+use super::input::{GridInput, known_spacing};
 use crate::cli::Failure;
 use crate::cli::args;
 use crate::cli::common::{self, Warnings, print_json, short, thousands};
@@ -27,7 +27,7 @@ Examples:
   progmesh terrain build alps.tif alps.pm
   progmesh terrain build etopo5.tif world.pm --floor 20 --json
   progmesh terrain build dem.raw dem.pm --size 16385x16385 --type u16 --floor 3 --memory 256
-  progmesh fly alps.pm --path circle --tau 1")]
+  progmesh fly alps.pm --path circle --grid alps.tif --tau 1 --cull frustum")]
 pub(crate) struct Args {
     #[command(flatten)]
     input: GridInput,
@@ -105,7 +105,8 @@ impl Args {
             let options = Options::default()
                 .with_floor(self.floor)
                 .with_cells(self.block)
-                .with_memory(self.memory << 20);
+                .with_memory(self.memory << 20)
+                .with_spacing(spacing(&source));
             let progress = Progress::new(&interrupt, self.quiet, "building");
             let building = Instant::now();
             let built = blocks::build(&*source.raster, &options, &folder, &Watch(&progress))
@@ -160,11 +161,12 @@ impl Args {
     /// What finished blocks belong to: grid, options that change them, and this version.
     fn belongs(&self, source: &GridFile) -> Result<String, Failure> {
         Ok(format!(
-            "progmesh {} terrain build\n{}\n{} x {}\nfloor {:?} block {} memory {}\n",
+            "progmesh {} terrain build\n{}\n{} x {}, {:?}\nfloor {:?} block {} memory {}\n",
             env!("CARGO_PKG_VERSION"),
             self.input.identity()?,
             source.raster.columns(),
             source.raster.rows(),
+            spacing(source),
             self.floor,
             self.block,
             self.memory
@@ -172,12 +174,17 @@ impl Args {
     }
 }
 
+/// Metres from column to column and from row to row; 1 where nobody knows.
+fn spacing(source: &GridFile) -> [f64; 2] {
+    known_spacing(source).unwrap_or([1.0; 2])
+}
+
 fn terrain(source: &GridFile, built: &Built, block: usize) -> Terrain {
     let (columns, rows) = (source.raster.columns(), source.raster.rows());
     Terrain {
         columns: columns as u32,
         rows: rows as u32,
-        spacing: source.georeference.spacing_metres(columns, rows).unwrap_or_default(),
+        spacing: built.spacing,
         error: built.error,
         cells: block as u32,
         levels: built.levels,

@@ -5,17 +5,18 @@ use crate::blocks::Built;
 use crate::progressive::shell_of;
 use crate::refine::format::{self, ChunkType, EncodeOptions};
 use crate::scene::{Scene, SceneMesh};
+use glam::{DMat4, DVec3};
 
-/// What a mesh is of a height grid: a `TERR` chunk. The mesh has x = column, y = height, z = row.
+/// What a mesh is of a height grid: a `TERR` chunk. The mesh has x = column, and y = height and z = row in the length of a step by a column.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Terrain {
     /// Samples in a row.
     pub columns: u32,
     /// Samples in a column.
     pub rows: u32,
-    /// Metres from column to column and from row to row; 0 where nobody knows.
+    /// Lengths of a step by a column and by a row, in the unit of heights; 1 where nobody knows.
     pub spacing: [f64; 2],
-    /// The greatest difference of height between a sample and full detail.
+    /// The greatest difference of height between a sample and full detail, in the unit of heights.
     pub error: f64,
     /// Steps along a side of the finest blocks.
     pub cells: u32,
@@ -61,12 +62,19 @@ impl Terrain {
     }
 }
 
-/// Writes a progressive terrain, in chunks that are read alone.
+/// Writes a progressive terrain, in chunks that are read alone. In the scene it stands as [`crate::ground::Space::World`] says: the middle of the grid at the origin.
 ///
 /// Errors: none that a terrain just built could have.
 pub fn encode_terrain(built: &Built, terrain: &Terrain) -> Result<Vec<u8>, format::EncodeError> {
     let mesh = SceneMesh { name: Some("terrain".into()), ..SceneMesh::default() };
-    let shell = write_shell(&shell_of(Scene::from_mesh(mesh)), &[]);
+    let mut scene = Scene::from_mesh(mesh);
+    let [x, z] = terrain.spacing;
+    let middle = [terrain.columns, terrain.rows].map(|n| f64::from(n.saturating_sub(1)) / 2.0);
+    let origin = DVec3::new(-middle[0] * x, 0.0, -middle[1] * z);
+    for node in &mut scene.nodes {
+        node.transform = DMat4::from_translation(origin) * DMat4::from_scale(DVec3::splat(x));
+    }
+    let shell = write_shell(&shell_of(scene), &[]);
     let options =
         EncodeOptions::default().with_pages(true).with_other(ChunkType::TERRAIN, 0, terrain.to_bytes());
     format::encode(std::slice::from_ref(&built.mesh), &[], &shell, &options)

@@ -1,7 +1,7 @@
 //! Half-edge collapses, the cheapest first by the exact error of the triangles that come of it (Hoppe 1998).
 
 use super::NONE;
-use super::history::{History, distance};
+use super::history::History;
 use super::relief::Relief;
 use super::sheet::{Sheet, Vertex};
 use super::surface::{Ring, Surface, Wing, next, previous};
@@ -23,7 +23,7 @@ pub struct Collapse {
     pub beside: [[u32; 2]; 2],
     /// The bound of its split; see the [module](super). Never less than that of a split that needs it.
     pub bound: f32,
-    /// The radius of a sphere about `kept` for which the bound holds.
+    /// The radius of a sphere about `kept` for which the bound holds, in steps by a column.
     pub radius: f32,
 }
 
@@ -36,6 +36,8 @@ pub struct Rules {
     pub shared: [bool; 4],
     /// Stop at so many vertices.
     pub vertices: usize,
+    /// How long a step by a row and a unit of height are, in steps by a column.
+    pub scale: [f64; 2],
 }
 
 impl Rules {
@@ -91,7 +93,7 @@ pub(super) struct Collapsed {
 ///
 /// O(n log n) for n vertices, and the samples of the triangles looked at.
 pub(super) fn collapse(mut sheet: Sheet, relief: &Relief, rules: &Rules) -> Option<Collapsed> {
-    let history = History::new(&mut sheet);
+    let history = History::new(&mut sheet, rules.scale);
     let n = sheet.vertices.len();
     let surface = Surface::new(&sheet.faces, n)?;
     let mut work = Work {
@@ -181,7 +183,7 @@ impl Work<'_> {
         History::inner(&ring, i, inner);
         let wings = self.surface.collapse(u, i, &ring);
         let dying = wings.into_iter().flatten().map(|w| w.side / 3);
-        let way = distance(self.vertices[u as usize], self.vertices[v as usize]);
+        let way = self.history.distance(self.vertices[u as usize], self.vertices[v as usize]);
         let j = self.history.begin(u, v, dying, way);
         let [from, to] = [u, v].map(|v| self.vertices[v as usize]);
         self.history.measure_gone(self.relief, to, inner, j, room);

@@ -32,6 +32,8 @@ pub(super) struct History {
     /// at either of its sides. A face is forgotten as soon as its split needs whatever takes its tip away next.
     open: Vec<[u32; 2]>,
     stills: Vec<Still>,
+    /// How long a step by a row and a unit of height are, in steps by a column.
+    scale: [f64; 2],
 }
 
 /// How deep dependencies are followed. Deeper they would rule out a few more triangles: bounds are a little larger than they might be.
@@ -40,8 +42,9 @@ const DEPTH: u32 = 3;
 const MOST: usize = 1024;
 
 impl History {
-    pub(super) fn new(sheet: &mut Sheet) -> Self {
+    pub(super) fn new(sheet: &mut Sheet, scale: [f64; 2]) -> Self {
         let mut h = History {
+            scale,
             head: Vec::with_capacity(3 * sheet.faces.len()),
             joined: std::mem::take(&mut sheet.joined).into_flattened(),
             last: std::mem::take(&mut sheet.last),
@@ -84,6 +87,13 @@ impl History {
             }
             None => NONE,
         }
+    }
+
+    /// Between two vertices, heights included, in steps by a column.
+    pub(super) fn distance(&self, a: Vertex, b: Vertex) -> f64 {
+        let (x, y) = (f64::from(a.x - b.x), f64::from(a.y - b.y) * self.scale[0]);
+        let z = (f64::from(a.z) - f64::from(b.z)) * self.scale[1];
+        (x * x + y * y + z * z).sqrt()
     }
 
     /// Split `i` needs `j`.
@@ -156,7 +166,7 @@ impl History {
         }
         let mut most = self.bounds[j as usize];
         let all = room.iter().flatten();
-        let radius = all.clone().map(|&b| distance(a, b)).fold(0.0, f64::max);
+        let radius = all.clone().map(|&b| self.distance(a, b)).fold(0.0, f64::max);
         if room[0].len() * room[1].len() > MOST {
             most = most.max(up(relief.span(all.copied().chain([a]))));
         } else {
@@ -315,12 +325,6 @@ impl History {
         }
         sheet.past = past;
     }
-}
-
-/// Between two vertices, heights included.
-pub(super) fn distance(a: Vertex, b: Vertex) -> f64 {
-    let (x, y) = (f64::from(a.x - b.x), f64::from(a.y - b.y));
-    (x * x + y * y + (f64::from(a.z) - f64::from(b.z)).powi(2)).sqrt()
 }
 
 /// The least f32 that is not below a number.

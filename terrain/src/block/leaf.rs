@@ -8,11 +8,12 @@ use crate::tin::start::{full, network};
 use crate::{Grid, Raster, RasterError, Window};
 
 /// How a grid is divided: squares of samples at level 0, which share their border samples; 2 x 2 blocks are one of the next level, up to a level of one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layout {
     columns: usize,
     rows: usize,
     cells: usize,
+    scale: [f64; 2],
 }
 
 /// Why a block was not made.
@@ -44,7 +45,15 @@ impl Layout {
             columns,
             rows,
             cells,
+            scale: [1.0; 2],
         })
+    }
+
+    /// With a step by a row and a unit of height as long as this, in steps by a column: radii are measured so. By default all are as long.
+    #[must_use]
+    pub fn with_scale(mut self, scale: [f64; 2]) -> Self {
+        self.scale = scale;
+        self
     }
 
     /// Samples in a row, and in a column.
@@ -89,6 +98,7 @@ impl Layout {
             rectangle: [w.column as i32, x as i32, w.row as i32, y as i32],
             shared: [w.column > 0, x + 1 < self.columns, w.row > 0, y + 1 < self.rows],
             vertices,
+            scale: self.scale,
         }
     }
 }
