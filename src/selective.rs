@@ -4,6 +4,7 @@ mod flight;
 mod heights;
 mod judge;
 mod morph;
+mod paged;
 mod player;
 mod record;
 mod shot;
@@ -13,6 +14,7 @@ pub use flight::{FlightPath, FrameSpace, PathError, circle, lemniscate, recorded
 pub use heights::GroundJudgement;
 pub use judge::{Judge, Judgement};
 pub use morph::Geomorph;
+pub use paged::{PagedScene, PagedSceneError, Ranges};
 pub use player::player_page;
 pub use record::{FrameCounts, RecordError, Recorder, Recording, upward};
 pub use shot::{ShotStyle, shot};
@@ -64,21 +66,27 @@ pub enum SelectiveError {
 /// Halvings of the interval of tolerances in [`SelectiveScene::extract`]: to a millionth.
 const HALVINGS: u32 = 24;
 
+/// Where each of so many meshes stands; without nodes where its coordinates say.
+fn places_of(shell: &Scene, meshes: usize) -> Vec<Vec<DMat4>> {
+    let mut places = vec![Vec::new(); meshes];
+    let shown = shell.instance_counts();
+    for (node, world) in shell.nodes.iter().zip(shell.world_transforms()) {
+        if let Some(m) = node.mesh.filter(|&m| m < meshes && shown.get(m).is_some_and(|&n| n > 0)) {
+            places[m].push(world);
+        }
+    }
+    if shell.nodes.is_empty() {
+        places.iter_mut().for_each(|p| p.push(DMat4::IDENTITY));
+    }
+    places
+}
+
 impl SelectiveScene {
     /// Builds the hierarchies; every mesh shows its base. About 70 microseconds a vertex.
     ///
     /// Errors: a damaged mesh.
     pub fn new(scene: ProgressiveScene, options: &Options) -> Result<SelectiveScene, SelectiveError> {
-        let mut places = vec![Vec::new(); scene.meshes.len()];
-        let shown = scene.shell.instance_counts();
-        for (node, world) in scene.shell.nodes.iter().zip(scene.shell.world_transforms()) {
-            if let Some(m) = node.mesh.filter(|&m| shown.get(m).is_some_and(|&n| n > 0)) {
-                places[m].push(world);
-            }
-        }
-        if scene.shell.nodes.is_empty() {
-            places.iter_mut().for_each(|p| p.push(DMat4::IDENTITY));
-        }
+        let places = places_of(&scene.shell, scene.meshes.len());
         let each = scene.meshes.into_iter().enumerate().map(|(mesh, pm)| {
             let h = Hierarchy::new(Arc::new(pm), options);
             h.map(|h| View::new(Arc::new(h))).map_err(|source| SelectiveError::Damage { mesh, source })

@@ -177,3 +177,58 @@ fn visible_changes_morph_and_a_camera_that_stands_still_shows_what_it_would_with
     let most = by_error.iter().map(|f| f["measured"]["max_pixels"].as_f64().unwrap()).fold(0.0, f64::max);
     assert!(most <= 2.0, "{most}");
 }
+
+/// A file read through `--memory` shows what it shows when it is read whole, from a part of its bytes.
+#[test]
+fn with_a_limit_of_memory_the_same_is_shown_of_fewer_bytes() {
+    let p = place();
+    p.generate("scan", "in.ply", 20_000);
+    p.done("encode in.ply in.pm --random-access --bounds --any-order -q");
+    p.done("extract in.pm whole.ply --camera cam.json -q");
+    let r = p.done("extract in.pm paged.ply --camera cam.json --memory 64 --json -q").json();
+    assert!(p.read("whole.ply") == p.read("paged.ply"));
+    let paging = &r["paging"];
+    let number = |of: &Value, name: &str| of[name].as_u64().unwrap_or_else(|| panic!("{name} of {of}"));
+    assert_eq!(number(paging, "limit_bytes"), 64 << 20);
+    assert_eq!(number(paging, "file_bytes"), p.read("in.pm").len() as u64);
+    assert!(number(paging, "bytes_touched") <= number(paging, "file_bytes"));
+    assert!(number(paging, "most_bytes") < 64 << 20 && number(paging, "chunks_touched") > 0);
+    let turned = |x: f64| CAMERA.replace("0.2, 0.3, 2.2", &format!("{x}, 0.3, 2.0"));
+    let path: Vec<String> = (0..5).map(|k| turned(0.4 * k as f64 - 0.7)).collect();
+    p.write("path.json", format!("[{}]", path.join(",")));
+    let flight = "fly in.pm --path path.json --tau 2 --json -q";
+    let (whole, paged) = (p.done(flight).json(), p.done(&format!("{flight} --memory 64")).json());
+    for k in 0..5 {
+        for field in ["faces", "vertices", "vsplits", "ecols", "visible_vertices", "complete"] {
+            assert_eq!(whole["frames"][k][field], paged["frames"][k][field], "{field} of frame {k}");
+        }
+    }
+    let slow = p.done(&format!("{flight} --memory 64 --fetches 1")).json();
+    assert!(slow["frames"].as_array().unwrap().iter().all(|f| number(f, "fetched") <= 1));
+    assert!(number(&slow["frames"][0], "faces") < number(&paged["frames"][0], "faces"));
+}
+
+#[test]
+fn what_cannot_be_read_in_parts_is_told() {
+    let p = place();
+    p.generate("scan", "in.ply", 20_000);
+    p.done("encode in.ply plain.pm -q");
+    p.done("encode in.ply alone.pm --random-access -q");
+    p.done("encode in.ply in.pm --random-access --bounds -q");
+    let whole = p.read("in.pm");
+    p.write("cut.pm", &whole[..whole.len() - 100]);
+    for (arguments, code, says) in [
+        ("extract in.ply out.ply --camera cam.json --memory 64", 2, "progmesh encode in.ply"),
+        ("extract plain.pm out.ply --camera cam.json --memory 64", 3, "--random-access --bounds"),
+        ("extract alone.pm out.ply --camera cam.json --memory 64", 3, "--random-access --bounds"),
+        ("extract cut.pm out.ply --camera cam.json --memory 64", 3, "shorter than it says"),
+        ("extract in.pm out.ply --camera cam.json --memory 1", 3, "the limit of 1048576 bytes is too small"),
+        ("extract in.pm out.ply --camera cam.json --memory 0", 2, "1 or more"),
+        ("fly in.pm --path circle --memory 64 --measure-every 2", 2, "--measure-every"),
+        ("fly in.pm --path circle --fetches 2", 2, "--memory"),
+    ] {
+        let run = p.run(arguments);
+        assert_eq!(run.code, code, "{arguments}: {}", run.stderr);
+        assert!(run.stderr.contains(says), "{arguments}: {}", run.stderr);
+    }
+}

@@ -549,8 +549,34 @@ struct Extract {
     full_faces: usize,
     full_splits: usize,
     visible_vertices: usize,
+    #[serde(deserialize_with = "present")]
+    strips: Option<ExtractStrips>,
+    #[serde(deserialize_with = "present")]
+    paging: Option<Paging>,
     seconds: ExtractSeconds,
     warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ExtractStrips {
+    count: usize,
+    mean_length: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Paging {
+    limit_bytes: u64,
+    most_bytes: u64,
+    file_bytes: u64,
+    bytes_read: u64,
+    bytes_touched: u64,
+    requests: u64,
+    chunks: u64,
+    chunks_touched: u64,
+    chunks_decoded: u64,
+    evictions: u64,
 }
 
 #[derive(Deserialize)]
@@ -590,6 +616,8 @@ struct Fly {
     #[serde(deserialize_with = "present")]
     uncovered: Option<usize>,
     memory: FlyMemory,
+    #[serde(deserialize_with = "present")]
+    paging: Option<Paging>,
     frames: Vec<FlyFrame>,
     seconds: FlySeconds,
     warnings: Vec<String>,
@@ -629,6 +657,10 @@ struct FlyFrame {
     visible_vertices: usize,
     dirty_index_bytes: usize,
     dirty_wedges: usize,
+    #[serde(deserialize_with = "present")]
+    fetched: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    no_room: Option<usize>,
     #[serde(deserialize_with = "present")]
     measured: Option<FlyMeasured>,
     #[serde(deserialize_with = "present")]
@@ -698,6 +730,28 @@ fn selective_commands_print_one_object_with_the_documented_fields() {
     assert!(judged.samples > 0 && judged.mean_pixels <= judged.max_pixels && judged.max_height >= 0.0);
     assert_eq!((judged.uncovered, judged.cracks, judged.folds), (0, 0, 0));
     assert_eq!((g.cracks, g.folds, g.uncovered), (Some(0), Some(0), Some(0)));
+    assert!(e.strips.is_none());
+    let s: Extract =
+        serde_json::from_str(&of("extract in.obj out.ply --camera cam.json --tau 2 --strips --json"))
+            .unwrap();
+    let strips = s.strips.unwrap();
+    assert!(
+        strips.mean_length > 2.0 && (strips.mean_length * strips.count as f64 - s.faces as f64).abs() < 1e-6
+    );
+    assert!(e.paging.is_none() && f.paging.is_none() && f.frames[0].fetched.is_none());
+    p.done("encode in.obj in.pm --random-access --bounds -q");
+    let g: Fly = serde_json::from_str(&of("fly in.pm --path circle --frames 2 --memory 32 --json")).unwrap();
+    let paged = g.paging.unwrap();
+    assert!(
+        paged.most_bytes <= paged.limit_bytes
+            && paged.bytes_touched <= paged.bytes_read.min(paged.file_bytes)
+    );
+    assert!(
+        paged.chunks_touched <= paged.chunks.min(paged.chunks_decoded)
+            && paged.requests >= paged.chunks_decoded
+    );
+    assert!(paged.evictions <= paged.chunks_decoded);
+    assert!(g.frames.iter().all(|f| f.fetched.is_some() && f.no_room == Some(0)));
     assert!(f.frames[2].measured.as_ref().is_some_and(|m| m.samples > 100) && f.frames[1].measured.is_none());
 }
 

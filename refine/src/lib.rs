@@ -30,6 +30,7 @@ pub mod paged;
 pub mod progressive;
 mod record;
 pub mod selective;
+mod strips;
 pub mod view;
 
 pub use geomorph::{Geomorph, GeomorphError};
@@ -38,3 +39,4 @@ pub use progmesh_aif as aif;
 pub use progmesh_simplify as simplify;
 pub use progressive::{Cursor, ProgressiveMesh};
 pub use record::{History, HistoryLevel};
+pub use strips::Strips;

@@ -181,6 +181,16 @@ impl<S: ByteRanges> PagedView<S> {
         Lens::about(self.shelf.base.links.origin, camera, placed, tau, cull)
     }
 
+    /// The box about the vertices of the base; `None` if it has none.
+    pub fn base_box(&self) -> Option<(DVec3, DVec3)> {
+        self.shelf.base.mesh.base_positions.bounds()
+    }
+
+    /// Bytes of head and directory of the file.
+    pub fn directory_bytes(&self) -> u64 {
+        self.shelf.directory_bytes()
+    }
+
     /// The limit, bytes.
     pub fn limit(&self) -> usize {
         self.limit

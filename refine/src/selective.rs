@@ -9,6 +9,9 @@
 //! in another order, so it has no cracks, and its links are sound. Faces keep their slots in the index buffer for as long as they are there. What is
 //! shown where the lens looks deviates by no more pixels than the tolerance, as far as [`crate::hierarchy`] says what its errors bound.
 //!
+//! With feature `parallel` long lists of splits are decided about by the threads of the pool that [`View::adapt`] is called in; what it does, to the order of slots, is the same for every
+//! number of them.
+//!
 //! Not guaranteed: which slot of the index buffer a face has; that depends on what came before. That the triangles are the fewest.
 
 mod adapt;

@@ -10,7 +10,7 @@ use progmesh::io::{EncodeOptions, Format};
 use progmesh::normals::{DEFAULT_CREASE, Normals};
 use progmesh::progressive::ProgressiveScene;
 use progmesh::scene::Scene;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A format, as flags name it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -55,6 +55,12 @@ impl Input {
         common::name(&self.input, "standard input")
     }
 
+    /// Its path, if it is to be read as a progressive mesh.
+    pub(crate) fn progressive_path(&self) -> Option<&Path> {
+        let named = || Format::from_name(&self.input.to_string_lossy());
+        (self.from.map(Format::from).or_else(named) == Some(Format::Pm)).then_some(&*self.input)
+    }
+
     pub(crate) fn read(&self, warnings: &mut Warnings) -> Result<Loaded, Failure> {
         common::read(&self.input, self.from, warnings)
     }
@@ -65,9 +71,8 @@ impl Input {
         warnings: &mut Warnings,
         make: impl FnOnce(Scene, &mut Warnings) -> Result<ProgressiveScene, Failure>,
     ) -> Result<ProgressiveScene, Failure> {
-        let named = || Format::from_name(&self.input.to_string_lossy());
-        if self.from.map(Format::from).or_else(named) == Some(Format::Pm) {
-            return common::read_progressive(&self.input, false, warnings);
+        if let Some(path) = self.progressive_path() {
+            return common::read_progressive(path, false, warnings);
         }
         make(self.read(warnings)?.decoded.scene, warnings)
     }

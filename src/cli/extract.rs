@@ -1,14 +1,18 @@
 //! `progmesh extract IN OUT --camera CAM`.
 
+mod paged;
+
 use super::args::{self, Input};
 use super::common::{self, Warnings, short, thousands};
 use super::control::{Interrupt, Progress};
 use super::ending::Ending;
 use super::method::Making;
+use super::paging::Paging;
 use super::{Failure, camera};
 use clap::ValueEnum;
 use progmesh::pipeline::build_progressive;
 use progmesh::progressive::ProgressiveScene;
+use progmesh::refine::Strips;
 use progmesh::refine::hierarchy;
 use progmesh::refine::selective::Cull;
 use progmesh::report::View;
@@ -26,6 +30,8 @@ use std::time::Instant;
 Examples:
   progmesh extract dragon.ply near.ply --camera cam.json --tau 1
   progmesh extract scene.pm view.glb --camera scene.glb#door --budget-faces 20000
+  progmesh extract city.pm street.glb --camera cam.json --memory 256
+  progmesh extract scan.ply out.glb --camera cam.json --strips
   progmesh extract scan.ply out.obj --camera cam.json --cull none --png out.png --wireframe
 
 Exit code 1 means: done and written, but the base has more faces than --budget-faces.")]
@@ -39,6 +45,9 @@ pub(crate) struct Args {
     camera: String,
     #[command(flatten)]
     needs: Needs,
+    /// Form triangle strips of what is shown, and report how long they are
+    #[arg(long, help_heading = "View")]
+    strips: bool,
     #[command(flatten)]
     making: Making,
 }
@@ -56,6 +65,9 @@ pub(crate) struct Needs {
     /// What to leave coarse however near it is
     #[arg(long, value_enum, default_value_t = CullName::All, help_heading = "View")]
     cull: CullName,
+    /// Read of a .pm only what is needed, and hold at most so many MiB of it: for files of any size, made by encode --random-access --bounds
+    #[arg(long, value_name = "MIB", value_parser = args::positive, allow_negative_numbers = true, help_heading = "View")]
+    pub(crate) memory: Option<usize>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -135,6 +147,9 @@ impl Args {
         let mut results = self.ending.begin()?;
         let camera = camera::read(&self.camera, &mut results.warnings)?;
         results.through(View::of_camera(&camera));
+        if let Some(mib) = self.needs.memory {
+            return self.run_paged(mib, &camera, results, start);
+        }
         let file = self.input.name();
         let interrupt = Interrupt::watch();
         let (report, full) = common::in_pool(self.making.collapsing.threads, || {
@@ -157,6 +172,8 @@ impl Args {
                 full_faces: made.scene.full_faces(),
                 full_splits: made.scene.views().iter().map(|v| v.hierarchy().splits()).sum(),
                 visible_vertices: made.scene.visible_vertices(&camera),
+                strips: self.strips.then(|| StripReport::of(made.scene.views().iter().map(|v| v.strips()))),
+                paging: None,
                 seconds: Seconds {
                     read: made.read,
                     bounds: made.bounds,
@@ -172,17 +189,23 @@ impl Args {
         self.ending.say(|| {
             let at = report.tau.map_or("inf".into(), short);
             format!(
-                "{file}: {} of {} faces at {at} pixels; {:.3} s (read {:.3}, bounds {:.3}, refine {:.3}, write {:.3})",
+                "{file}: {} of {} faces at {at} pixels; {:.3} s (read {:.3}, bounds {:.3}, refine {:.3}, write {:.3}){}",
                 thousands(report.faces),
                 thousands(full),
                 report.seconds.total,
                 report.seconds.read,
                 report.seconds.bounds,
                 report.seconds.refine,
-                report.seconds.write
+                report.seconds.write,
+                StripReport::text(report.strips)
             )
         });
         self.ending.print(&report)?;
+        self.kept_budget(&report)
+    }
+
+    fn kept_budget(&self, report: &Report) -> Result<(), Failure> {
+        let file = self.input.name();
         match self.needs.budget_faces {
             Some(n) if report.faces > n => Err(Failure::Missed(format!(
                 "{file}: {} faces left, more than the {} asked for: that is the base, nothing is coarser",
@@ -206,8 +229,32 @@ struct Report {
     full_faces: usize,
     full_splits: usize,
     visible_vertices: usize,
+    strips: Option<StripReport>,
+    paging: Option<Paging>,
     seconds: Seconds,
     warnings: Vec<String>,
+}
+
+#[derive(Clone, Copy, Serialize)]
+struct StripReport {
+    count: usize,
+    mean_length: f64,
+}
+
+impl StripReport {
+    /// Of the meshes' strips together.
+    fn of(all: impl Iterator<Item = Strips>) -> StripReport {
+        let sum = |(n, t): (usize, usize), s: Strips| (n + s.len(), t + s.triangles());
+        let (count, triangles) = all.fold((0, 0), sum);
+        StripReport { count, mean_length: triangles as f64 / count.max(1) as f64 }
+    }
+
+    /// For people, behind other things.
+    fn text(this: Option<StripReport>) -> String {
+        this.map_or(String::new(), |s| {
+            format!("; {} strips of {:.1} triangles", thousands(s.count), s.mean_length)
+        })
+    }
 }
 
 #[derive(Serialize)]

@@ -2,6 +2,7 @@
 
 mod flight;
 mod geomorph;
+mod paged;
 mod path;
 mod play;
 mod report;
@@ -36,6 +37,7 @@ Examples:
   progmesh fly dragon.ply --path circle --geomorph=time:20 --measure-every 10
   progmesh fly dragon.ply --path circle --html dragon.html --html-taus 1,4
   progmesh fly alps.pm --path lemniscate --grid alps.tif --path-speed fast --measure-every 10
+  progmesh fly city.pm --path walk.json --memory 256 --fetches 2
   progmesh fly terrain.obj --path canyon.frames --path-scale 1024 --budget-us 500
 
 Exit code 1 means: done, but the measured error came above --tau in a frame that had come to rest, with no vertex on the way.")]
@@ -60,6 +62,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "HOW", num_args = 0..=1, require_equals = true, default_missing_value = "time",
           value_parser = geomorph::parse, help_heading = "View")]
     geomorph: Option<Geomorph>,
+    /// With --memory: chunks to fetch in a frame at most; until later frames the mesh is coarser
+    #[arg(long, value_name = "N", value_parser = args::positive, allow_negative_numbers = true, requires = "memory",
+          help_heading = "View")]
+    fetches: Option<usize>,
     /// Measure the error that is shown on every Kth frame
     #[arg(long, value_name = "K", value_parser = args::positive, allow_negative_numbers = true, help_heading = "Report")]
     measure_every: Option<usize>,
@@ -98,6 +104,9 @@ impl Args {
         self.play.check()?;
         let interrupt = Interrupt::watch();
         let mut report = common::in_pool(self.making.collapsing.threads, || {
+            if let Some(mib) = self.needs.memory {
+                return self.run_paged(mib, &source, &interrupt);
+            }
             let made = extract::make(&self.input, &self.making, self.quiet, &interrupt, &mut warnings)?;
             let (seconds, mut scene) = ([made.read, made.bounds], made.scene);
             let course = self.path.lay(&source, scene.bounds(), &file)?;
@@ -115,6 +124,7 @@ impl Args {
             let path = self.path.name().to_string();
             Ok(Report::new(path, self.needs.tau, scene.full_faces(), report.0, memory, seconds))
         })?;
+        warnings.say(std::mem::take(&mut report.warnings));
         report.warnings = warnings.all;
         if !self.quiet {
             report.text(&file).iter().for_each(|line| common::note(line));
@@ -206,6 +216,8 @@ impl Args {
                 visible_vertices: step.scene.visible_vertices(step.camera),
                 dirty_index_bytes: step.changes.iter().map(|c| c.index_bytes()).sum(),
                 dirty_wedges: step.changes.iter().map(|c| c.wedges.len()).sum(),
+                fetched: None,
+                no_room: None,
                 measured,
                 on_ground,
             });

@@ -25,6 +25,7 @@ mod lod;
 mod man;
 mod method;
 mod morph;
+mod paging;
 mod picture;
 mod problems;
 mod simplify;

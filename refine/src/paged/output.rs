@@ -1,6 +1,7 @@
 //! The mesh of a paged view, as buffers and as a mesh.
 
 use super::PagedView;
+use crate::Strips;
 use crate::aif::{MeshInput, NONE, Positions, Wedges};
 use crate::format::ByteRanges;
 use glam::DVec3;
@@ -71,6 +72,11 @@ impl<S: ByteRanges> PagedView<S> {
             }
         }
         (runs, std::mem::take(&mut self.touched_wedges))
+    }
+
+    /// The faces shown as triangle strips over the wedges of [`PagedView::indices`]. Takes memory of its own beside the limit. O(faces shown).
+    pub fn strips(&self) -> Strips {
+        Strips::new(self.indices())
     }
 
     /// The mesh as flat arrays: vertices, faces and wedges that are shown, numbered in the order of the file. Takes memory of its own beside the limit. O(shown, and resident

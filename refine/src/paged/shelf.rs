@@ -182,16 +182,21 @@ impl<S: ByteRanges> Shelf<S> {
         Ok((shelf, Fans { corners, links: links_of_faces }))
     }
 
-    /// Bytes held; the directory of the file is in.
+    /// Bytes held; with the mesh's part of the directory of the file.
     pub(super) fn bytes(&self) -> usize {
+        let directory = self.reader.directory();
         let head = 4 * (self.head.single.capacity() + self.head.levels.capacity());
         self.base.bytes()
             + head
             + size_of::<ChunkAt>() * self.chunks.capacity()
             + 4 * self.index.capacity()
             + 8 * self.pages.capacity()
-            + size_of::<Chunk>() * self.reader.directory().chunks.capacity()
+            + size_of::<Chunk>() * directory.chunks.capacity() / (directory.meshes as usize).max(1)
             + self.held
+    }
+
+    pub(super) fn directory_bytes(&self) -> u64 {
+        self.reader.directory().bytes()
     }
 
     /// What decoding a chunk takes on the way, at most.

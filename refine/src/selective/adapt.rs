@@ -58,6 +58,28 @@ struct Meter<'a> {
     whole: bool,
 }
 
+/// Entries from which on a list is decided about by several threads: below, handing out the work takes as long.
+#[cfg(feature = "parallel")]
+const MANY: usize = 4096;
+
+/// What `f` says of each entry of a long list, found by several threads, with the split that it is of; nothing of a short one.
+///
+/// The loops that go through a list ask it for what they would have found out themselves, so its being there changes nothing but the time.
+fn ahead<R: Send>(entries: &[Entry], f: impl Fn(&Entry) -> R + Sync + Send) -> Vec<(u32, R)> {
+    #[cfg(feature = "parallel")]
+    if entries.len() >= MANY && rayon::current_num_threads() > 1 {
+        use rayon::prelude::*;
+        return entries.par_iter().with_min_len(MANY / 4).map(|e| (e.split, f(e))).collect();
+    }
+    let _ = (entries, f);
+    Vec::new()
+}
+
+/// What is known ahead of the entry in a place, unless another has come there since.
+fn known<R: Copy>(ahead: &[(u32, R)], at: usize, e: &Entry) -> Option<R> {
+    ahead.get(at).filter(|a| a.0 == e.split).map(|a| a.1)
+}
+
 /// Where to begin looking through a list of `len`, downwards, and whether that is its end.
 fn start(resume: usize, len: usize) -> (usize, bool) {
     if resume == 0 || resume >= len { (len, true) } else { (resume, false) }
@@ -115,11 +137,12 @@ impl View {
         // Downwards: what comes in is put at the end, and looked at as it does.
         let (mut at, whole) = start(self.resume[0], self.last.entries.len());
         let mut stack = Vec::new();
+        let before = ahead(&self.last.entries, wants);
         while at > 0 && meter.goes_on() {
             at = (at - 1).min(self.last.entries.len().saturating_sub(1));
             meter.looks += 1;
             let Some(e) = self.last.entries.get(at) else { break };
-            if wants(e) {
+            if known(&before, at, e).unwrap_or_else(|| wants(e)) {
                 continue;
             }
             stack.push(e.split);
@@ -158,12 +181,13 @@ impl View {
             || meter.limits.operations < usize::MAX
             || meter.limits.expired.is_some();
         let rank = |e: &Entry| if sorted { bucket(urgency(e)) } else { 0 };
+        let needed = |e: &Entry| wants(e).then(|| rank(e));
+        let before = ahead(&self.open.entries, needed);
         while at > 0 && meter.goes_on() {
             at -= 1;
             meter.looks += 1;
             let Some(e) = self.open.entries.get(at) else { break };
-            if wants(e) {
-                let b = rank(e);
+            if let Some(b) = known(&before, at, e).unwrap_or_else(|| needed(e)) {
                 highest = highest.max(b);
                 buckets[b].push(e.split);
             }

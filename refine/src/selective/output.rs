@@ -1,6 +1,7 @@
 //! The mesh of a view, as buffers and as a mesh.
 
 use super::View;
+use crate::Strips;
 use crate::aif::{MeshInput, NONE, Positions, Wedges};
 use glam::DVec3;
 
@@ -64,6 +65,11 @@ impl View {
             }
         }
         out
+    }
+
+    /// The faces shown as triangle strips over the wedges of [`View::indices`]. O(faces shown).
+    pub fn strips(&self) -> Strips {
+        Strips::new(self.indices())
     }
 
     /// The mesh as flat arrays: vertices, faces and wedges that are shown, numbered in the order of the progressive mesh. If every split is applied, this is

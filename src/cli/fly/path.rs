@@ -93,6 +93,11 @@ fn speed(text: &str) -> Result<Speed, String> {
 
 impl PathArgs {
     /// As given.
+    /// A flag that was given, if any was.
+    pub(super) fn given(&self) -> Option<&'static str> {
+        self.grid.as_ref().map(|_| "--grid")
+    }
+
     pub(super) fn name(&self) -> &str {
         &self.path
     }

@@ -39,6 +39,11 @@ const PAGE: usize = 64 << 10;
 
 impl PlayArgs {
     /// Fails where the page could not be written.
+    /// A flag that was given, if any was.
+    pub(super) fn given(&self) -> Option<&'static str> {
+        self.html.as_ref().map(|_| "--html")
+    }
+
     pub(super) fn check(&self) -> Result<(), Failure> {
         self.html.as_deref().map_or(Ok(()), common::check_target)
     }

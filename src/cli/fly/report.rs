@@ -1,5 +1,6 @@
 //! What a flight came to.
 
+use super::super::paging::Paging;
 use super::common::{short, thousands};
 use progmesh::selective::GroundJudgement;
 use serde::Serialize;
@@ -25,6 +26,7 @@ pub(super) struct Report {
     folds: Option<usize>,
     uncovered: Option<usize>,
     memory: Memory,
+    pub(super) paging: Option<Paging>,
     frames: Vec<Frame>,
     seconds: Seconds,
     pub(super) warnings: Vec<String>,
@@ -44,6 +46,8 @@ pub(super) struct Frame {
     pub(super) visible_vertices: usize,
     pub(super) dirty_index_bytes: usize,
     pub(super) dirty_wedges: usize,
+    pub(super) fetched: Option<usize>,
+    pub(super) no_room: Option<usize>,
     pub(super) measured: Option<Measured>,
     pub(super) on_ground: Option<OnGround>,
 }
@@ -162,6 +166,7 @@ impl Report {
             folds: sum(&|g| g.folds),
             uncovered: sum(&|g| g.uncovered),
             memory,
+            paging: None,
             seconds: Seconds { read, bounds },
             warnings: vec![],
             frames,
@@ -191,6 +196,10 @@ impl Report {
         }
         if let Some(m) = &self.measured_over_tau {
             lines.push(s("measured error / tau", m));
+        }
+        if let Some(p) = &self.paging {
+            lines.push(format!("  {}", p.text()));
+            return lines;
         }
         if let (Some(cracks), Some(folds), Some(uncovered)) = (self.cracks, self.folds, self.uncovered) {
             lines.push(format!(

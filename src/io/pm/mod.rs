@@ -119,6 +119,18 @@ fn check_faces(
     }
 }
 
+/// What stands around so many meshes, from the bytes that hold it, if there are any.
+///
+/// Errors: damage; a scene of another number of meshes.
+pub(crate) fn shell(bytes: Option<&[u8]>, meshes: usize) -> Result<Scene, DecodeError> {
+    let Some(bytes) = bytes else { return Ok(plain_shell(meshes)) };
+    let shell = read_shell(bytes)?.0;
+    match shell.meshes.len() {
+        n if n == meshes => Ok(shell),
+        n => Err(chunk::wrong("scene", format!("describes {n} meshes, the file has {meshes}"))),
+    }
+}
+
 /// A scene of so many meshes, one node each.
 fn plain_shell(meshes: usize) -> Scene {
     let mut shell = Scene::default();

@@ -1,0 +1,112 @@
+//! `fly --memory`: of a file only what the frames need.
+
+use super::super::Failure;
+use super::super::control::Interrupt;
+use super::super::paging::{self, Paging};
+use super::Args;
+use super::path::Source;
+use super::report::{Frame, Memory, Report};
+use progmesh::refine::paged::PagedLimits;
+use progmesh::refine::selective::{Limits, Regulator};
+use progmesh::refine::view::Camera;
+use progmesh::selective::PagedScene;
+use std::time::{Duration, Instant};
+
+impl Args {
+    pub(super) fn run_paged(
+        &self,
+        mib: usize,
+        source: &Source,
+        interrupt: &Interrupt,
+    ) -> Result<Report, Failure> {
+        let file = self.input.name();
+        // What looks at the whole mesh, or draws.
+        let measuring = self.measure_every.map(|_| "--measure-every");
+        let morphing = self.geomorph.map(|_| "--geomorph");
+        let given = [measuring, morphing, self.path.given(), self.shots.given(), self.play.given()];
+        if let Some(flag) = given.into_iter().flatten().next() {
+            return Err(Failure::Usage(format!("--memory and {flag} do not go together")));
+        }
+        let start = Instant::now();
+        let mut scene = paging::open(&self.input, mib)?;
+        let read = start.elapsed().as_secs_f64();
+        let course = self.path.lay(source, scene.bounds(), &file)?;
+        let mut most = scene.bytes();
+        let frames = self.fly_paged(&mut scene, &course.cameras, interrupt, &mut most)?;
+        self.something_seen(&frames, scene.bounds())?;
+        let (held, shown) = (scene.bytes(), scene.shown_bytes());
+        let memory = Memory {
+            shared_bytes: held - shown,
+            shared_bytes_per_vertex: (held - shown) as f64 / scene.full_vertices().max(1) as f64,
+            view_bytes: shown,
+            view_table_bytes: 0,
+            most_vertices: frames.iter().map(|f| f.vertices).max().unwrap_or(0),
+        };
+        let short = frames.iter().filter(|f| f.no_room.is_some_and(|n| n > 0)).count();
+        let path = self.path.name().to_string();
+        let mut report = Report::new(path, self.needs.tau, scene.full_faces(), frames, memory, [read, 0.0]);
+        report.paging = Some(Paging::of(&scene, mib, most));
+        if short > 0 {
+            report.warnings.push(format!(
+                "{file}: {mib} MiB were too little for {}: they are coarser than asked",
+                progmesh::pipeline::count(short, "frame")
+            ));
+        }
+        Ok(report)
+    }
+
+    fn fly_paged(
+        &self,
+        scene: &mut PagedScene,
+        path: &[Camera],
+        interrupt: &Interrupt,
+        most: &mut usize,
+    ) -> Result<Vec<Frame>, Failure> {
+        let file = self.input.name();
+        let mut regulator = self.needs.budget_faces.map(|n| Regulator::new(n, self.needs.tau));
+        let mut frames = Vec::with_capacity(path.len());
+        scene.take_changes();
+        for camera in path {
+            if interrupt.is_set() {
+                return Err(Failure::Interrupted);
+            }
+            let tau = regulator.as_ref().map_or(self.needs.tau, |r| r.tau());
+            let start = Instant::now();
+            let end = self.budget_us.map(|us| start + Duration::from_micros(us as u64));
+            let expired = || end.is_some_and(|end| Instant::now() >= end);
+            let limits = Limits {
+                faces: self.needs.budget_faces.unwrap_or(usize::MAX),
+                expired: end.is_some().then_some(&expired as &dyn Fn() -> bool),
+                hysteresis: self.hysteresis,
+                ..Limits::default()
+            };
+            let limits = PagedLimits { limits, fetches: self.fetches.unwrap_or(usize::MAX) };
+            let done = scene.adapt(camera, tau, self.needs.cull(), &limits);
+            let done = done.map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+            let us = start.elapsed().as_secs_f64() * 1e6;
+            *most = scene.bytes().max(*most);
+            if let Some(r) = &mut regulator {
+                r.note(scene.face_count(), done.done.complete);
+            }
+            let (dirty_index_bytes, dirty_wedges) = scene.take_changes();
+            frames.push(Frame {
+                faces: scene.face_count(),
+                vertices: scene.vertex_count(),
+                vsplits: done.done.splits,
+                ecols: done.done.collapses,
+                us,
+                tau: tau.is_finite().then_some(tau),
+                complete: done.done.complete,
+                morphing: 0,
+                visible_vertices: scene.visible_vertices(camera),
+                dirty_index_bytes,
+                dirty_wedges,
+                fetched: Some(done.fetched),
+                no_room: Some(done.no_room),
+                measured: None,
+                on_ground: None,
+            });
+        }
+        Ok(frames)
+    }
+}

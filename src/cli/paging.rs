@@ -1,0 +1,73 @@
+//! `--memory`: a progressive mesh that is read where views need it.
+
+use super::Failure;
+use super::args::Input;
+use super::common::thousands;
+use progmesh::io::files;
+use progmesh::selective::PagedScene;
+use serde::Serialize;
+
+/// What was read, and held: a part of the schema of `--json`.
+#[derive(Clone, Copy, Serialize)]
+pub(crate) struct Paging {
+    limit_bytes: usize,
+    /// The most that was held, of what was noted.
+    most_bytes: usize,
+    file_bytes: u64,
+    bytes_read: u64,
+    bytes_touched: u64,
+    requests: u64,
+    chunks: usize,
+    chunks_touched: u64,
+    chunks_decoded: u64,
+    evictions: u64,
+}
+
+/// Opens the input, with a limit of so many MiB.
+pub(crate) fn open(input: &Input, mib: usize) -> Result<PagedScene, Failure> {
+    let file = input.name();
+    let Some(path) = input.progressive_path() else {
+        return Err(Failure::Usage(format!(
+            "{file}: --memory is for .pm files: write one first (progmesh encode {file} out.pm --random-access --bounds)"
+        )));
+    };
+    let source = files::open(path).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+    let limit = mib.saturating_mul(1 << 20);
+    PagedScene::new(source, limit).map_err(|e| Failure::Input(format!("{file}: {e}")))
+}
+
+impl Paging {
+    pub(crate) fn of(scene: &PagedScene, mib: usize, most_bytes: usize) -> Paging {
+        let t = scene.traffic();
+        Paging {
+            limit_bytes: mib.saturating_mul(1 << 20),
+            most_bytes,
+            file_bytes: scene.file_bytes(),
+            bytes_read: t.bytes_read,
+            bytes_touched: t.bytes_touched,
+            requests: t.requests,
+            chunks: scene.chunks(),
+            chunks_touched: t.chunks_touched,
+            chunks_decoded: t.chunks_decoded,
+            evictions: t.evictions,
+        }
+    }
+
+    /// For people.
+    pub(crate) fn text(&self) -> String {
+        let mib = |b: usize| b as f64 / (1 << 20) as f64;
+        format!(
+            "{} of {} bytes read ({:.1} % of the file; {} with what was read again), {} of {} chunks; {} decoded, {} let go; {:.1} of {:.1} MiB held at most",
+            thousands(self.bytes_touched as usize),
+            thousands(self.file_bytes as usize),
+            100.0 * self.bytes_touched as f64 / (self.file_bytes.max(1)) as f64,
+            thousands(self.bytes_read as usize),
+            thousands(self.chunks_touched as usize),
+            thousands(self.chunks),
+            thousands(self.chunks_decoded as usize),
+            thousands(self.evictions as usize),
+            mib(self.most_bytes),
+            mib(self.limit_bytes)
+        )
+    }
+}

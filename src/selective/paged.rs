@@ -1,0 +1,324 @@
+//! A scene refined where a camera needs it, of which only what is needed is read.
+
+use super::{HALVINGS, places_of};
+use crate::aif::NONE;
+use crate::io::DecodeError;
+use crate::io::grid::ReadAt;
+use crate::io::pm;
+use crate::refine::format::{ByteRanges, ChunkType, FormatError, RangeReader};
+use crate::refine::paged::{PagedDone, PagedError, PagedLimits, PagedView, Traffic};
+use crate::refine::selective::{Cull, Lens, LensError, Limits};
+use crate::refine::view::Camera;
+use crate::scene::Scene;
+use glam::{DMat4, DVec3};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// Bytes at any place as ranges of a progressive mesh.
+#[derive(Clone)]
+pub struct Ranges(pub Arc<dyn ReadAt>);
+
+impl std::fmt::Debug for Ranges {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Ranges({} bytes)", self.0.length())
+    }
+}
+
+impl ByteRanges for Ranges {
+    fn fetch(&self, range: Range<u64>) -> std::io::Result<Vec<u8>> {
+        let end = range.end.min(self.0.length());
+        let length = end.saturating_sub(range.start);
+        let length = usize::try_from(length).map_err(|_| std::io::ErrorKind::OutOfMemory)?;
+        let mut out = vec![0; length];
+        self.0.read_at(range.start, &mut out)?;
+        Ok(out)
+    }
+}
+
+/// A scene cannot be refined out of core.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PagedSceneError {
+    /// The file is damaged, or could not be read.
+    #[error("{0}")]
+    Format(#[from] FormatError),
+    /// What stands around the meshes is damaged.
+    #[error("{0}")]
+    Scene(#[from] DecodeError),
+    /// A mesh.
+    #[error("mesh {mesh}: {source}")]
+    Mesh {
+        /// Its number.
+        mesh: usize,
+        /// What is wrong.
+        source: PagedError,
+    },
+    /// The view cannot be had of a mesh.
+    #[error("mesh {mesh}: {source}")]
+    Lens {
+        /// Its number.
+        mesh: usize,
+        /// What is wrong.
+        source: LensError,
+    },
+}
+
+/// As [`super::SelectiveScene`], of a file that is read where it is needed ([`PagedView`]). The limit of memory is for all meshes together; what stands around them (nodes, materials,
+/// images) comes on top.
+#[derive(Debug)]
+pub struct PagedScene {
+    shell: Scene,
+    views: Vec<PagedView<Ranges>>,
+    places: Vec<Vec<DMat4>>,
+    limit: usize,
+    file_bytes: u64,
+    shell_bytes: u64,
+    chunks: usize,
+}
+
+impl PagedScene {
+    /// Reads the directory, the bases and what stands around the meshes; every mesh shows its base.
+    ///
+    /// Errors: a file that was not written for it, damage, a limit of `limit` bytes that not even the bases fit into.
+    pub fn new(source: Arc<dyn ReadAt>, limit: usize) -> Result<PagedScene, PagedSceneError> {
+        let file_bytes = source.length();
+        let reader = Arc::new(RangeReader::new(Ranges(source))?);
+        let directory = reader.directory();
+        if directory.file_bytes() > file_bytes {
+            return Err(FormatError::Head("the file is shorter than it says").into());
+        }
+        let meshes = directory.meshes as usize;
+        let of_scene = directory.chunks.iter().find(|c| c.kind == ChunkType::SCENE);
+        let bytes = match of_scene.map(|c| (c, reader.read(c.index, None))) {
+            Some((_, Ok(crate::refine::format::Piece::Scene(bytes)))) => Some(bytes),
+            Some((_, Err(e))) => return Err(e.into()),
+            _ => None,
+        };
+        let shell_bytes = of_scene.map_or(0, |c| c.stored);
+        let shell = pm::shell(bytes.as_deref(), meshes)?;
+        let chunks = directory.chunks.iter().filter(|c| c.kind == ChunkType::SPLITS).count();
+        let mut views: Vec<PagedView<Ranges>> = Vec::new();
+        let mut held = 0;
+        for mesh in 0..meshes {
+            let view = PagedView::new(reader.clone(), mesh as u32, limit.saturating_sub(held));
+            let view = view.map_err(|source| PagedSceneError::Mesh { mesh, source })?;
+            held += view.bytes();
+            views.push(view);
+        }
+        let places = places_of(&shell, meshes);
+        Ok(PagedScene { shell, views, places, limit, file_bytes, shell_bytes, chunks })
+    }
+
+    /// The views, one a mesh.
+    pub fn views(&self) -> &[PagedView<Ranges>] {
+        &self.views
+    }
+
+    /// Faces shown, of all meshes, each counted once.
+    pub fn face_count(&self) -> usize {
+        self.views.iter().map(PagedView::face_count).sum()
+    }
+
+    /// Vertices shown.
+    pub fn vertex_count(&self) -> usize {
+        self.views.iter().map(PagedView::vertex_count).sum()
+    }
+
+    /// Splits applied.
+    pub fn applied(&self) -> usize {
+        self.views.iter().map(PagedView::applied).sum()
+    }
+
+    /// Faces at full detail.
+    pub fn full_faces(&self) -> usize {
+        self.views.iter().map(PagedView::full_faces).sum()
+    }
+
+    /// Vertices at full detail.
+    pub fn full_vertices(&self) -> usize {
+        self.views.iter().map(PagedView::full_vertices).sum()
+    }
+
+    /// Splits at full detail.
+    pub fn splits(&self) -> usize {
+        self.views.iter().map(PagedView::splits).sum()
+    }
+
+    /// Bytes held for the meshes, never more than the limit.
+    pub fn bytes(&self) -> usize {
+        self.views.iter().map(PagedView::bytes).sum()
+    }
+
+    /// Of these, bytes that grow with what is shown.
+    pub fn shown_bytes(&self) -> usize {
+        self.views.iter().map(PagedView::shown_bytes).sum()
+    }
+
+    /// Bytes of the file.
+    pub fn file_bytes(&self) -> u64 {
+        self.file_bytes
+    }
+
+    /// Chunks of splits in the file.
+    pub fn chunks(&self) -> usize {
+        self.chunks
+    }
+
+    /// What was read so far. Head and directory count once.
+    pub fn traffic(&self) -> Traffic {
+        let mut all = Traffic::default();
+        (all.bytes_read, all.bytes_touched) = (self.shell_bytes, self.shell_bytes);
+        all.requests = (self.shell_bytes > 0) as u64;
+        for (k, view) in self.views.iter().enumerate() {
+            let (t, again) = (view.traffic(), if k > 0 { view.directory_bytes() } else { 0 });
+            all.bytes_read += t.bytes_read - again;
+            all.bytes_touched += t.bytes_touched - again;
+            all.requests += t.requests - if k > 0 { 2 } else { 0 };
+            all.chunks_decoded += t.chunks_decoded;
+            all.chunks_touched += t.chunks_touched;
+            all.evictions += t.evictions;
+        }
+        all
+    }
+
+    /// Least and greatest coordinates in the world of boxes about the meshes, each with the middle and the diagonal of the finest mesh's and the shape of the base's; `None` if nothing is
+    /// shown.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let mut all: Option<(DVec3, DVec3)> = None;
+        for (view, places) in self.views.iter().zip(&self.places) {
+            let ((middle, diagonal), Some((lo, hi))) = (view.extent(), view.base_box()) else { continue };
+            let size = hi - lo;
+            let half = 0.5 * size * (diagonal / size.length().max(f64::MIN_POSITIVE)).min(1e9);
+            for m in places {
+                for k in 0..8u32 {
+                    let pick = |axis: usize| if k >> axis & 1 == 1 { half[axis] } else { -half[axis] };
+                    let p = m.transform_point3(middle + DVec3::new(pick(0), pick(1), pick(2)));
+                    all = Some(all.map_or((p, p), |(lo, hi)| (lo.min(p), hi.max(p))));
+                }
+            }
+        }
+        all
+    }
+
+    /// Adapts all meshes to a camera. The limits of faces, memory and fetches are for all of them; the others are for each.
+    ///
+    /// Errors: damage; a tolerance that is none; a mesh placed by a matrix that flattens it.
+    pub fn adapt(
+        &mut self,
+        camera: &Camera,
+        tau: f64,
+        cull: Cull,
+        limits: &PagedLimits<'_>,
+    ) -> Result<PagedDone, PagedSceneError> {
+        let mut all = PagedDone::default();
+        all.done.complete = true;
+        for mesh in 0..self.views.len() {
+            let lens = |p: &DMat4| self.views[mesh].lens(camera, p, tau, cull);
+            let lenses: Result<Vec<Lens>, LensError> = self.places[mesh].iter().map(lens).collect();
+            let lenses = lenses.map_err(|source| PagedSceneError::Lens { mesh, source })?;
+            let others = self.face_count() - self.views[mesh].face_count();
+            let faces = limits.limits.faces.saturating_sub(others);
+            // Once with what is free, and if that is too little, once more with what others can spare.
+            for attempt in 0..2 {
+                let held = self.bytes() - self.views[mesh].bytes();
+                let view = &mut self.views[mesh];
+                view.set_limit(self.limit.saturating_sub(held));
+                let own = PagedLimits {
+                    limits: Limits { faces, ..limits.limits },
+                    fetches: limits.fetches.saturating_sub(all.fetched),
+                };
+                let done = view.adapt(&lenses, &own);
+                let done = done.map_err(|source| PagedSceneError::Mesh { mesh, source })?;
+                all.done.splits += done.done.splits;
+                all.done.collapses += done.done.collapses;
+                all.done.forced += done.done.forced;
+                all.fetched += done.fetched;
+                let spare = |(k, v): (usize, &mut PagedView<Ranges>)| if k == mesh { 0 } else { v.trim() };
+                let more = done.no_room > 0 && attempt == 0;
+                if more && self.views.iter_mut().enumerate().map(spare).sum::<usize>() > 0 {
+                    continue;
+                }
+                all.done.refused += done.done.refused;
+                all.done.complete &= done.done.complete;
+                all.no_room += done.no_room;
+                all.postponed += done.postponed;
+                break;
+            }
+        }
+        Ok(all)
+    }
+
+    /// Adapts to a camera at `tau`, or at the least tolerance above it with which at most `faces` faces are shown and what the camera needs fits into the memory. Returns that tolerance;
+    /// it is infinite if the bases have more faces.
+    ///
+    /// Errors: as [`PagedScene::adapt`].
+    pub fn extract(
+        &mut self,
+        camera: &Camera,
+        tau: f64,
+        cull: Cull,
+        faces: Option<usize>,
+    ) -> Result<f64, PagedSceneError> {
+        let most = faces.unwrap_or(usize::MAX);
+        let limits = PagedLimits::default();
+        let mut fits = |tau: f64| -> Result<bool, PagedSceneError> {
+            let done = self.adapt(camera, tau, cull, &limits)?;
+            Ok(self.face_count() <= most && done.done.complete)
+        };
+        if fits(tau)? {
+            return Ok(tau);
+        }
+        let (mut low, mut high) = (tau, tau.max(1e-3));
+        loop {
+            high *= 2.0;
+            if fits(high)? || high.is_infinite() {
+                break;
+            }
+            low = high;
+        }
+        for _ in 0..if high.is_finite() { HALVINGS } else { 0 } {
+            let middle = 0.5 * (low + high);
+            *if fits(middle)? { &mut high } else { &mut low } = middle;
+        }
+        fits(high)?;
+        Ok(high)
+    }
+
+    /// Bytes of the index buffers, and entries of the vertex buffers, that changed since this was last called.
+    pub fn take_changes(&mut self) -> (usize, usize) {
+        let each = self.views.iter_mut().map(PagedView::take_changes);
+        each.fold((0, 0), |(bytes, wedges), (runs, w)| {
+            (bytes + runs.iter().map(|r| 12 * r.len()).sum::<usize>(), wedges + w)
+        })
+    }
+
+    /// The scene as it is shown. O(n shown); the memory it takes comes on top of the limit.
+    pub fn to_scene(&self) -> Scene {
+        let mut scene = self.shell.clone();
+        scene.meshes.resize_with(self.views.len(), Default::default);
+        let materials = scene.materials.len() as u32;
+        for (mesh, view) in scene.meshes.iter_mut().zip(&self.views) {
+            let mut geometry = view.to_input();
+            // What the file's pages name is known only now.
+            geometry.face_material.iter_mut().filter(|m| **m >= materials).for_each(|m| *m = NONE);
+            let groups = mesh.groups.len() as u32;
+            if groups > 0 {
+                geometry.face_group.iter_mut().filter(|g| **g >= groups).for_each(|g| *g = NONE);
+            }
+            mesh.geometry = geometry;
+        }
+        scene
+    }
+
+    /// Vertices that a camera's frustum holds, of those shown, places counted each.
+    pub fn visible_vertices(&self, camera: &Camera) -> usize {
+        let frustum = camera.frustum();
+        let mut count = 0;
+        for (view, places) in self.views.iter().zip(&self.places) {
+            for p in view.vertices().filter_map(|v| view.position(v)) {
+                count += places.iter().filter(|m| frustum.contains(m.transform_point3(p))).count();
+            }
+        }
+        count
+    }
+}
