@@ -97,7 +97,8 @@ impl<'a> Former<'a> {
         let mut code = *self.along.get(&(a, b))?;
         loop {
             let f = code >> 2;
-            if !self.used[f as usize] && !(self.growing && self.tried[f as usize] == self.attempt) {
+            let tried = self.growing && self.tried[f as usize] == self.attempt;
+            if !(tried || self.used[f as usize]) {
                 return Some((f, (code & 3) as usize));
             }
             code = *self.more.get(&code)?;
