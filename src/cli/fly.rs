@@ -186,7 +186,7 @@ impl Args {
             p.begin(self.needs.tau, true)?;
         }
         fly(scene, path, &self.setting(self.needs.tau, interrupt), &file, &mut |step: &Step<'_>| {
-            let due = self.measure_every.is_some_and(|n| step.number % n == 0);
+            let due = self.measure_every.is_some_and(|n| step.number.is_multiple_of(n));
             let measured = match judge.as_ref().filter(|_| due) {
                 Some(j) => {
                     let m = j.measure(step.scene, step.camera).map_err(|e| failed(&e))?;

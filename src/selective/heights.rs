@@ -48,7 +48,8 @@ impl Ground<'_> {
                 let last = n.saturating_sub(1) as f64;
                 let from = (lo - AT_SAMPLE).ceil().clamp(0.0, last) as usize;
                 let to = (hi + AT_SAMPLE).floor().clamp(-1.0, last);
-                if to < 0.0 { 1..=0 } else { from..=to as usize }
+                // Empty where the triangle lies beside the grid, or between samples.
+                from..(to + 1.0) as usize
             };
             for y in range(t.map(|p| p.y), rows) {
                 for x in range(t.map(|p| p.x), columns) {

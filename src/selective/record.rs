@@ -303,7 +303,8 @@ impl Shadow {
         let slots = view.indices().len();
         let mut changed = std::mem::take(&mut self.slots);
         if first {
-            changed = vec![0..slots];
+            changed.clear();
+            changed.push(0..slots);
         }
         changed.sort_unstable_by_key(|r| r.start);
         let mut vertices = std::mem::take(&mut self.vertices);

@@ -44,8 +44,7 @@ pub fn shot(
     let surface = Surface::of(shown)?;
     let view = View::of_camera(camera);
     let view = style.width.map_or(view.clone(), |w| view.resized(w));
-    let mut how = Style::default();
-    how.wireframe = style.wireframe;
+    let how = Style { wireframe: style.wireframe, ..Style::default() };
     let mut picture = render(&surface, &view, &how);
     if style.inset {
         let side = (INSET * f64::from(picture.width().min(picture.height()))) as u32;
@@ -70,8 +69,7 @@ fn from_above(
     });
     let north = if up.y.abs() > 0.5 { DVec3::NEG_Z } else { DVec3::Y };
     let view = View::fit(around, -up, north, side, side);
-    let mut style = Style::default();
-    (style.wireframe, style.shading) = (true, Shading::Flat);
+    let style = Style { wireframe: true, shading: Shading::Flat, ..Style::default() };
     let mut picture = render(surface, &view, &style);
     let reach = bounds.map_or(1.0, |(lo, hi)| {
         (0..8u32)

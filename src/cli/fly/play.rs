@@ -84,7 +84,7 @@ impl Playing<'_> {
     pub(super) fn take(&mut self, step: &Step<'_>) -> Result<(), Failure> {
         let counts = FrameCounts { splits: step.done.splits, collapses: step.done.collapses, tau: step.tau };
         self.recorder.note(step.scene, step.changes);
-        if step.number % self.stride != 0 {
+        if !step.number.is_multiple_of(self.stride) {
             self.recorder.skip(&counts);
             return Ok(());
         }

@@ -105,7 +105,7 @@ impl Shots<'_> {
         camera: &Camera,
         shown: impl FnOnce() -> (Scene, Option<(DVec3, DVec3)>, usize),
     ) -> Result<(), Failure> {
-        if self.every.is_none_or(|n| number % n != 0) {
+        if self.every.is_none_or(|n| !number.is_multiple_of(n)) {
             return Ok(());
         }
         let mut style = self.style;
