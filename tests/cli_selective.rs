@@ -150,8 +150,7 @@ fn visible_changes_morph_and_a_camera_that_stands_still_shows_what_it_would_with
     let path: Vec<String> = (0..24).map(eye).collect();
     p.write("path.json", format!("[{}]", path.join(",")));
     let fly = |flags: &str| {
-        let command =
-            format!("fly in.pm --path path.json --tau 2 --measure-every 1 --samples 2000 --json -q");
+        let command = "fly in.pm --path path.json --tau 2 --measure-every 1 --samples 2000 --json -q";
         p.done(&format!("{command} {flags}")).json()["frames"].as_array().unwrap().clone()
     };
     let n = |f: &Value, k: &str| f[k].as_u64().unwrap();
