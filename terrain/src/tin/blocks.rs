@@ -5,7 +5,7 @@ use super::field::Field;
 use super::network::Network;
 use super::parallel;
 use super::patch::{NONE, Patch, Rules, Vertex};
-use super::scan::keeps;
+use super::scan::{Corner, keeps};
 use super::thin::Scratch;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -100,10 +100,12 @@ impl Network {
         for &v in block.triangles.as_flattened() {
             inside[v as usize] += 1;
         }
-        let vertex = |(i, &v): (usize, &u32)| Vertex {
-            at: self.vertices[v as usize],
-            triangle: NONE,
-            locked: inside[i] != uses[v as usize],
+        let on_border =
+            |at: Corner| at.x == 0 || at.y == 0 || at.x == field.columns - 1 || at.y == field.rows - 1;
+        let vertex = |(i, &v): (usize, &u32)| {
+            let at = self.vertices[v as usize];
+            let locked = inside[i] != uses[v as usize] || rules.border_stays && on_border(at);
+            Vertex { at, triangle: NONE, locked }
         };
         let vertices = block.vertices.iter().enumerate().map(vertex).collect();
         let mut patch = Patch::new(field, rules, vertices, block.triangles.clone());

@@ -52,6 +52,13 @@ impl Field {
         Field { columns: grid.columns() as i32, rows: grid.rows() as i32, h, quantum, rounding }
     }
 
+    /// A part of it, with the same quantum: what several parts share has the same height in all.
+    pub(super) fn part(&self, [x0, y0]: [i32; 2], [x1, y1]: [i32; 2]) -> Self {
+        let row = |y: i32| &self.h[self.index(x0, y)..=self.index(x1, y)];
+        let h = (y0..=y1).flat_map(row).copied().collect();
+        Field { columns: x1 - x0 + 1, rows: y1 - y0 + 1, h, quantum: self.quantum, rounding: self.rounding }
+    }
+
     /// The error in quanta that keeps the true heights within `error`; `None` if rounding alone breaks that.
     pub(super) fn tolerance(&self, error: f64) -> Option<Tolerance> {
         if error < self.rounding {
@@ -90,6 +97,11 @@ impl Tolerance {
     #[inline]
     pub(super) fn over(self, area: i64) -> i64 {
         ((i128::from(self.0) * i128::from(area)) >> FRACTION_BITS) as i64
+    }
+
+    /// In fractions of a quantum, and how many of these a quantum has.
+    pub(super) fn fractions(self) -> (i64, i64) {
+        (self.0, 1 << FRACTION_BITS)
     }
 
     /// In quanta.

@@ -52,16 +52,26 @@ pub fn triangulate(grid: &Grid, options: &Options, control: &dyn Control) -> Res
         }
     };
     let errors = network.errors(&field, grid.heights());
-    let tin = Tin {
-        points: network.vertices.iter().map(|v| [v.x as u32, v.y as u32]).collect(),
-        heights: network.vertices.iter().map(|v| f64::from(v.z) * field.quantum).collect(),
-        triangles: network.triangles,
-    };
+    let tin = network.into_tin(&field, [0, 0]);
     let (valid, isolated, grid_triangles) = (region.valid, region.isolated, region.triangles);
     Ok(Made { tin, errors, valid, isolated, grid_triangles, step })
 }
 
-fn too_fine(grid: &Grid, field: &Field, error: f64) -> TinError {
+/// Improves what greedy insertion made. `None` when cancelled.
+pub(super) fn better(
+    network: &mut Network,
+    field: &Field,
+    rules: Rules,
+    control: &dyn Control,
+) -> Option<()> {
+    for (i, shift) in SHIFTS.into_iter().enumerate() {
+        let done = [i, i + 1].map(|i| i as f64 / SHIFTS.len() as f64);
+        network.improve(field, Pass { shift, rules, done }, control)?;
+    }
+    Some(())
+}
+
+pub(super) fn too_fine(grid: &Grid, field: &Field, error: f64) -> TinError {
     let greatest = grid.range().map_or(0.0, |(l, g)| l.abs().max(g.abs()));
     TinError::TooFine { error, least: field.rounding, greatest }
 }
@@ -138,7 +148,7 @@ impl Work<'_> {
     fn make(&self, options: &Options, tolerance: Tolerance) -> Option<(Network, Option<usize>)> {
         let surface = options.contract == Contract::Surface;
         let free_heights = options.method == Method::Best && !options.on_samples;
-        let rules = Rules { tolerance, surface, free_heights };
+        let rules = Rules { tolerance, surface, free_heights, border_stays: false };
         let goal = Goal { tolerance, surface, triangles: options.triangles.unwrap_or(usize::MAX) };
         let network = match options.method {
             Method::Regular => {
@@ -161,10 +171,7 @@ impl Work<'_> {
     fn best(&self, rules: Rules) -> Option<Network> {
         let mut network =
             self.greedy(Goal { tolerance: rules.tolerance, surface: rules.surface, triangles: usize::MAX })?;
-        for (i, shift) in SHIFTS.into_iter().enumerate() {
-            let done = [i, i + 1].map(|i| i as f64 / SHIFTS.len() as f64);
-            network.improve(self.field, Pass { shift, rules, done }, self.control)?;
-        }
+        better(&mut network, self.field, rules, self.control)?;
         Some(network)
     }
 

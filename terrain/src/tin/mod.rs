@@ -25,6 +25,7 @@ mod field;
 mod fill;
 mod greedy;
 mod heights;
+mod line;
 mod make;
 mod network;
 mod options;
@@ -36,8 +37,10 @@ mod regular;
 pub(crate) mod scan;
 pub(crate) mod start;
 mod thin;
+mod tiles;
 mod verify;
 
 pub use make::triangulate;
 pub use options::{Contract, Control, Errors, Made, Method, Options, Quiet, Tin, TinError};
+pub use tiles::{Cuts, Level, Tiling};
 pub use verify::{Verdict, verify};

@@ -1,11 +1,11 @@
 //! A whole network in quanta, and how far it lies from the samples.
 
-use super::Errors;
 use super::delaunay::Triangulation;
 use super::field::Field;
 use super::parallel;
 use super::region::Region;
 use super::scan::{Corner, Plane, crossings, farthest, rows};
+use super::{Errors, Tin};
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Network {
@@ -58,6 +58,15 @@ impl Network {
         self.vertices.truncate(count as usize);
         for v in self.triangles.as_flattened_mut() {
             *v = new[*v as usize];
+        }
+    }
+
+    /// The same in the grid's units, its first sample at this column and row of another grid.
+    pub(super) fn into_tin(self, field: &Field, [x, y]: [u32; 2]) -> Tin {
+        Tin {
+            points: self.vertices.iter().map(|v| [v.x as u32 + x, v.y as u32 + y]).collect(),
+            heights: self.vertices.iter().map(|v| f64::from(v.z) * field.quantum).collect(),
+            triangles: self.triangles,
         }
     }
 

@@ -172,6 +172,12 @@ pub enum TinError {
     /// An error that is not a number, or negative.
     #[error("an error must be a number, 0 or more")]
     BadError,
+    /// Tiles of another method than greedy insertion and the best, or with an error between samples.
+    #[error("tiles are made by the methods greedy and best, with an error at the samples")]
+    NoTiles,
+    /// Cuts that are not in ascending order from the first to the last sample, or a tile that is none.
+    #[error("cuts must ascend from the first column and row to the last, and a tile lie between two of them")]
+    BadCuts,
     /// Stopped by [`Control::cancelled`].
     #[error("cancelled")]
     Cancelled,

@@ -39,6 +39,8 @@ pub(super) struct Rules {
     pub surface: bool,
     /// Whether heights may change.
     pub free_heights: bool,
+    /// Whether vertices on the border of the rectangle stay as they are: another network has them too.
+    pub border_stays: bool,
 }
 
 /// The triangles around a vertex, to the left.

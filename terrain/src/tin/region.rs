@@ -73,6 +73,16 @@ impl Region {
                 || self.cells[y as usize * (self.columns as usize - 1) + x as usize] & bit != 0)
     }
 
+    /// Whether the triangles on both sides of the edge from `(x, y)` to `(x, y + 1)` are valid: the one of lower columns first.
+    pub(super) fn beside_column(&self, x: i32, y: i32) -> [bool; 2] {
+        [self.has(x - 1, y, FIRST), self.has(x, y, SECOND)]
+    }
+
+    /// The same of the edge from `(x, y)` to `(x + 1, y)`: the one of lower rows first.
+    pub(super) fn beside_row(&self, x: i32, y: i32) -> [bool; 2] {
+        [self.has(x, y - 1, SECOND), self.has(x, y, FIRST)]
+    }
+
     /// All valid triangles of the grid, as indices of their samples, row by row.
     pub(super) fn grid_triangles(&self) -> Vec<[u32; 3]> {
         let mut triangles = Vec::with_capacity(self.triangles);
@@ -177,7 +187,12 @@ impl Region {
             mesh.insert(p);
         }
         runs.sort_unstable_by_key(|r| order(&r[0]));
-        for run in runs {
+        let (right, last) = (self.columns - 1, self.rows - 1);
+        // Whatever vertices the border of the rectangle has, there are sides between them.
+        let on_border = |[a, b]: &Run| {
+            a.0 == b.0 && (a.0 == 0 || a.0 == right) || a.1 == b.1 && (a.1 == 0 || a.1 == last)
+        };
+        for run in runs.into_iter().filter(|run| !on_border(run)) {
             // Unit sides are always there: no other sample lies in the circle over one. Longer ones may need vertices between.
             let mut parts = vec![run];
             while let Some([a, b]) = parts.pop() {
