@@ -150,3 +150,53 @@ fn what_cannot_be_is_said() {
     p.write("spike.raw", heights.iter().flat_map(|h| h.to_le_bytes()).collect::<Vec<_>>());
     p.run("terrain tin spike.raw out.ply --max-error 1 --size 2x2 --type f64").failed(3, "--nodata");
 }
+
+/// A white PNG of a pixel.
+fn pixel() -> Vec<u8> {
+    let mut bytes = vec![];
+    let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.write_header().unwrap().write_image_data(&[255]).unwrap();
+    bytes
+}
+
+#[test]
+fn a_texture_is_laid_over_the_whole_grid() {
+    let p = place();
+    p.write("photo.png", pixel());
+    tin(&p, "out.glb --max-error 6 --spacing 30 --texture photo.png");
+    let document = gltf::Gltf::open(p.path("out.glb")).unwrap();
+    let blob = document.blob.clone().unwrap();
+    let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
+    let reader = primitive.reader(|_| Some(&blob));
+    let positions: Vec<[f32; 3]> = reader.read_positions().unwrap().collect();
+    let uvs: Vec<[f32; 2]> = reader.read_tex_coords(0).unwrap().into_f32().collect();
+    for (p, uv) in positions.iter().zip(&uvs) {
+        // Half a pixel from the borders, v down as rows go.
+        let (column, row) = (p[0] / 30.0 + 23.5, p[2] / 30.0 + 19.5);
+        let [u, v] = [(column + 0.5) / 48.0, (row + 0.5) / 40.0];
+        assert!((uv[0] - u).abs() < 1e-5 && (uv[1] - v).abs() < 1e-5, "{p:?}: {uv:?}");
+    }
+    let texture = primitive.material().pbr_metallic_roughness().base_color_texture().unwrap();
+    let gltf::image::Source::View { view, mime_type } = texture.texture().source().source() else {
+        panic!("the picture is not in the file");
+    };
+    assert_eq!(mime_type, "image/png");
+    assert!(blob[view.offset()..][..view.length()] == pixel());
+
+    std::fs::create_dir(p.path("there")).unwrap();
+    tin(&p, "there/out.obj --max-error 6 --texture photo.png --normals");
+    assert!(p.read("there/photo.png") == pixel());
+    assert!(p.text("there/out.mtl").contains("map_Kd photo.png"));
+    let text = p.text("there/out.obj");
+    let count = |start: &str| text.lines().filter(|l| l.starts_with(start)).count();
+    assert!(count("vt ") == count("v ") && count("vn ") > 0, "{} {}", count("vt "), count("v "));
+    tin(&p, "out.ply --max-error 6 --uv");
+    tin(&p, "plain.obj --max-error 6");
+    assert!(!p.text("plain.obj").contains("\nvt ") && !p.text("plain.obj").contains("\nvn "));
+    p.write("photo.txt", "no picture");
+    p.run(&format!("terrain tin hills.raw o.glb --max-error 6 --texture photo.txt {RAW}"))
+        .failed(3, "PNG or a JPEG");
+    p.run(&format!("terrain tin hills.raw o.glb --max-error 6 --texture none.png {RAW}"))
+        .failed(3, "none.png");
+}

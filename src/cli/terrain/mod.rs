@@ -1,6 +1,7 @@
 //! `progmesh terrain`: height grids.
 
 mod build;
+mod dress;
 mod info;
 pub(crate) mod input;
 mod tin;

@@ -1,5 +1,6 @@
 //! `progmesh terrain tin GRID OUT`.
 
+use super::dress::DressArgs;
 use super::input::{GridInput, known_spacing, whole};
 use crate::cli::Failure;
 use crate::cli::args::{self, Output};
@@ -7,7 +8,7 @@ use crate::cli::common::{self, Warnings, short, thousands};
 use crate::cli::control::{Interrupt, Progress};
 use crate::cli::picture::PictureArgs;
 use clap::ValueEnum;
-use progmesh::ground::{self, Space};
+use progmesh::ground::{self, Dress, Space};
 use progmesh::io::Format;
 use progmesh::io::grid::GridFile;
 use progmesh::simplify::Control;
@@ -29,6 +30,7 @@ Examples:
   progmesh terrain tin N57E011.hgt coast.glb --max-error 10 --exaggeration 2 --png coast.png
   progmesh terrain tin alps.tif alps.obj --triangles 50000 --json
   progmesh terrain tin alps.tif alps.ply --max-error 5 --method greedy --verify
+  progmesh terrain tin alps.tif alps.glb --max-error 5 --texture orthophoto.jpg
   progmesh terrain tin dem.raw dem.stl --size 1025x1025 --type u16 --max-error 3 --on-samples
 
 Exit code 1 means: done and written, but the outline takes more triangles than asked for, or --verify found a fault.")]
@@ -69,6 +71,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "F", value_parser = factor, allow_negative_numbers = true, help_heading = "Space")]
     exaggeration: Option<f64>,
 
+    #[command(flatten)]
+    dress: DressArgs,
     #[command(flatten)]
     picture: PictureArgs,
     /// Threads to use; the result does not depend on it [default: all]
@@ -175,6 +179,7 @@ impl Args {
         let report = common::in_pool(self.threads, || {
             let source = self.input.open(&mut warnings)?;
             let space = self.space(format, &source, &mut warnings)?;
+            let dress = self.dress.dress(space, &source)?;
             let grid = whole(&file, &source)?;
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
@@ -194,12 +199,14 @@ impl Args {
                 return Err(Failure::Interrupted);
             }
             let writing = Instant::now();
-            let scene = ground::scene(&made.tin, &grid, space, "terrain");
+            let scene = ground::scene(&made.tin, &grid, space, &dress, "terrain");
             let facts = facts(&source, &grid, space, &made);
             self.output.write_with_facts(format, &scene, facts, &interrupt, &mut warnings)?;
             let write = writing.elapsed().as_secs_f64();
             if let Some(d) = &mut drawing {
-                let shown = ground::scene(&made.tin, &grid, picture_space(&source, &grid, space), "terrain");
+                let (space, dress) =
+                    (picture_space(&source, &grid, space), Dress { normals: true, ..Dress::default() });
+                let shown = ground::scene(&made.tin, &grid, space, &dress, "terrain");
                 d.add(&shown)?;
                 d.write()?;
             }
@@ -263,8 +270,8 @@ impl Args {
         seconds: Seconds,
     ) -> Report {
         let (space, spacing, exaggeration) = match space {
-            Space::Grid => ("grid", None, None),
             Space::World { spacing, exaggeration } => ("world", Some(spacing), Some(exaggeration)),
+            _ => ("grid", None, None),
         };
         Report {
             command: "terrain tin",

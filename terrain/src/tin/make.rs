@@ -4,7 +4,7 @@ use super::blocks::Pass;
 use super::field::{Field, Tolerance};
 use super::greedy::{Goal, greedy};
 use super::network::Network;
-use super::options::{Contract, Control, Made, Method, Options, Tin, TinError};
+use super::options::{Contract, Control, Made, Method, Options, TinError};
 use super::patch::Rules;
 use super::region::Region;
 use super::regular::regular;

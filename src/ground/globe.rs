@@ -1,0 +1,117 @@
+//! Terrain on the ellipsoid of WGS 84.
+
+use crate::terrain::{Affine, Grid};
+use glam::DVec3;
+
+/// Half of the larger axis of WGS 84 in metres, and the square of its eccentricity.
+const MAJOR: f64 = 6_378_137.0;
+const ECCENTRICITY_2: f64 = 0.006_694_379_990_141_317;
+
+/// Earth-centred coordinates (EPSG:4978, metres) of a longitude and a latitude in degrees and a height above the ellipsoid.
+pub fn earth_centred([longitude, latitude]: [f64; 2], height: f64) -> [f64; 3] {
+    let (sin_lat, cos_lat) = latitude.to_radians().sin_cos();
+    let (sin_lon, cos_lon) = longitude.to_radians().sin_cos();
+    let n = MAJOR / (1.0 - ECCENTRICITY_2 * sin_lat * sin_lat).sqrt();
+    let from_axis = (n + height) * cos_lat;
+    [from_axis * cos_lon, from_axis * sin_lon, (n * (1.0 - ECCENTRICITY_2) + height) * sin_lat]
+}
+
+/// A grid of degrees as a surface over the ellipsoid, in metres, with y up at its middle: x runs east there, z south. Heights count from the
+/// ellipsoid: what a geoid lies above it is not known here.
+///
+/// Vertices stand where they belong; between them triangles are flat, and lie below the curved surface by the square of their sides over
+/// eight times the radius of the Earth: [`Globe::sag`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Globe {
+    transform: Affine,
+    exaggeration: f64,
+    origin: DVec3,
+    /// Unit vectors at the origin.
+    east: DVec3,
+    north: DVec3,
+    up: DVec3,
+}
+
+impl Globe {
+    /// A grid whose transform leads to degrees of longitude and latitude, with heights in metres times `exaggeration`.
+    pub fn new(grid: &Grid, transform: Affine, exaggeration: f64) -> Self {
+        let [longitude, latitude] = transform.apply(super::middle(grid));
+        let (sin_lat, cos_lat) = latitude.to_radians().sin_cos();
+        let (sin_lon, cos_lon) = longitude.to_radians().sin_cos();
+        Globe {
+            transform,
+            exaggeration,
+            origin: earth_centred([longitude, latitude], 0.0).into(),
+            east: DVec3::new(-sin_lon, cos_lon, 0.0),
+            north: DVec3::new(-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat),
+            up: DVec3::new(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat),
+        }
+    }
+
+    /// Where a point of the grid stands.
+    pub(super) fn place(&self, point: [f64; 2], height: f64) -> [f64; 3] {
+        let p = DVec3::from(earth_centred(self.transform.apply(point), height * self.exaggeration));
+        let p = p - self.origin;
+        [p.dot(self.east), p.dot(self.up), -p.dot(self.north)]
+    }
+
+    /// The normal of the surface through two points across and two points down, to the outside.
+    pub(super) fn up(&self, point: [f64; 2], across: [[f64; 3]; 2], down: [[f64; 3]; 2]) -> [f64; 3] {
+        let [across, down] = [across, down].map(|[a, b]| DVec3::from(b) - DVec3::from(a));
+        let normal = down.cross(across);
+        // Grids may be mirrored; up is where heights grow.
+        let [low, high] = [0.0, 1.0].map(|h| DVec3::from(self.place(point, h)));
+        (if normal.dot(high - low) < 0.0 { -normal } else { normal }).into()
+    }
+
+    /// From these coordinates, turned to z up as 3D Tiles does it, to earth-centred ones: a 4 x 4 matrix, column after column.
+    pub fn to_earth(&self) -> [f64; 16] {
+        let mut matrix = [0.0; 16];
+        for (column, v) in [self.east, self.north, self.up, self.origin].into_iter().enumerate() {
+            matrix[4 * column..4 * column + 3].copy_from_slice(&v.to_array());
+        }
+        matrix[15] = 1.0;
+        matrix
+    }
+
+    /// By how much flat sides of this length in metres lie below the ellipsoid at most.
+    pub fn sag(length: f64) -> f64 {
+        // The least radius of curvature, that along the meridian at the equator.
+        length * length / (8.0 * MAJOR * (1.0 - ECCENTRICITY_2))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ground::Space;
+
+    #[test]
+    fn points_of_the_ellipsoid_are_known() {
+        assert_eq!(earth_centred([0.0, 0.0], 10.0), [MAJOR + 10.0, 0.0, 0.0]);
+        let pole = earth_centred([0.0, 90.0], 0.0);
+        assert!((pole[2] - 6_356_752.314_245).abs() < 1e-6 && pole[0].abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_frame_leads_back_to_the_earth() {
+        let grid = Grid::new(3, 3, vec![100.0; 9]).unwrap();
+        let transform = Affine::north_up([11.0, 58.0], [0.01, 0.01]);
+        let globe = Globe::new(&grid, transform, 1.0);
+        let m = globe.to_earth();
+        for (point, height) in [([0.0, 0.0], 100.0), ([2.0, 1.0], -7.0)] {
+            let [x, y, z] = globe.place(point, height);
+            let [x, y, z] = [x, -z, y];
+            let true_place = earth_centred(transform.apply(point), height);
+            for k in 0..3 {
+                let there = m[k] * x + m[4 + k] * y + m[8 + k] * z + m[12 + k];
+                assert!((there - true_place[k]).abs() < 1e-6);
+            }
+        }
+        // Flat ground: up at the middle is y, and the first row lies north, at negative z.
+        let n = Space::Globe(globe).normal(&grid, [1, 1]);
+        assert!((n[1] - 1.0).abs() < 1e-6, "{n:?}");
+        assert!(globe.place([1.0, 0.0], 0.0)[2] < -1000.0);
+        assert!((Globe::sag(10_000.0) - 1.97).abs() < 0.01);
+    }
+}
