@@ -160,6 +160,18 @@ impl Output {
         Ok(format)
     }
 
+    /// OUT as a directory to make. Fails, before any work is done, where none could be made.
+    pub(crate) fn directory(&self) -> Result<PathBuf, Failure> {
+        if self.to.is_some() || self.text || files::is_dash(&self.output) {
+            return Err(Failure::Usage(
+                "OUT is a directory here: it takes no --to, no --text and no -".into(),
+            ));
+        }
+        files::StagedDirectory::check(&self.output)
+            .map_err(|e| Failure::Output(format!("{}: {e}", self.output.display())))?;
+        Ok(self.output.clone())
+    }
+
     /// Encodes and writes.
     pub(crate) fn write(
         &self,

@@ -48,6 +48,11 @@ impl Globe {
         }
     }
 
+    /// What heights are multiplied by.
+    pub fn exaggeration(&self) -> f64 {
+        self.exaggeration
+    }
+
     /// Where a point of the grid stands.
     pub(super) fn place(&self, point: [f64; 2], height: f64) -> [f64; 3] {
         let p = DVec3::from(earth_centred(self.transform.apply(point), height * self.exaggeration));
@@ -72,6 +77,12 @@ impl Globe {
         }
         matrix[15] = 1.0;
         matrix
+    }
+
+    /// A direction in these coordinates, earth-centred.
+    pub fn direction_to_earth(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
+        let [x, y, z] = [x, y, z].map(f64::from);
+        (self.east * x + self.up * y - self.north * z).as_vec3().to_array()
     }
 
     /// By how much flat sides of this length in metres lie below the ellipsoid at most.

@@ -606,6 +606,84 @@ impl crate::blocks::Store for WorkFolder {
     }
 }
 
+/// A directory in the making: written whole under a temporary name beside its own; removed again unless published.
+#[derive(Debug)]
+pub struct StagedDirectory {
+    target: PathBuf,
+    /// `None` once published.
+    temporary: Option<PathBuf>,
+}
+
+impl StagedDirectory {
+    /// Fails where there is no directory for it, or something in its place that is no empty directory: nothing is ever replaced.
+    pub fn check(target: &Path) -> io::Result<()> {
+        let taken = |what: &str| Err(io::Error::new(ErrorKind::AlreadyExists, what.to_string()));
+        match fs::symlink_metadata(target) {
+            Ok(m) if !m.is_dir() => return taken("is there already, and no directory"),
+            Ok(_) if fs::read_dir(target)?.next().is_some() => {
+                return taken("is there already, and not empty: remove it, or name another directory");
+            }
+            Ok(_) => {}
+            Err(e) if e.kind() == ErrorKind::NotFound => {}
+            Err(e) => return Err(e),
+        }
+        match target.file_name() {
+            Some(_) => check_target(&directory_of(target).join(".progmesh")),
+            None => taken("names no directory to make"),
+        }
+    }
+
+    /// Begins one. See [`StagedDirectory::check`].
+    pub fn new(target: &Path) -> io::Result<Self> {
+        Self::check(target)?;
+        static COUNT: AtomicU64 = AtomicU64::new(0);
+        loop {
+            let n = COUNT.fetch_add(1, Ordering::Relaxed);
+            let name = format!(".progmesh-{}-{n}.tmp.d", std::process::id());
+            let temporary = directory_of(target).join(name);
+            match fs::create_dir(&temporary) {
+                Ok(()) => {
+                    return Ok(StagedDirectory { target: target.to_path_buf(), temporary: Some(temporary) });
+                }
+                Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+                Err(e) => return Err(e),
+            }
+        }
+    }
+
+    /// Writes a file in it, by a relative name without `..`. Threads may write at once.
+    pub fn write(&self, name: &str, bytes: &[u8]) -> io::Result<()> {
+        let below = relative_below(name).map_err(|why| io::Error::new(ErrorKind::InvalidInput, why))?;
+        let Some(temporary) = &self.temporary else { return Err(ErrorKind::NotFound.into()) };
+        let path = temporary.join(below);
+        fs::create_dir_all(directory_of(&path))?;
+        fs::write(path, bytes)
+    }
+
+    /// Gives it its own name.
+    pub fn publish(mut self) -> io::Result<()> {
+        if let Some(temporary) = &self.temporary {
+            // An empty directory is replaced where the system allows that; elsewhere it is removed first.
+            if fs::rename(temporary, &self.target).is_err() {
+                if self.target.is_dir() {
+                    fs::remove_dir(&self.target)?;
+                }
+                fs::rename(temporary, &self.target)?;
+            }
+        }
+        self.temporary = None;
+        Ok(())
+    }
+}
+
+impl Drop for StagedDirectory {
+    fn drop(&mut self) {
+        if let Some(t) = &self.temporary {
+            let _ = fs::remove_dir_all(t);
+        }
+    }
+}
+
 /// The most memory this process has held so far, in bytes; `None` where the system does not tell (all but Linux).
 pub fn peak_bytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
@@ -670,6 +748,27 @@ mod tests {
         write(&out, Format::Obj, &encoded, &|| false).unwrap();
         assert_eq!((fs::read(&out).unwrap(), fs::read(&side).unwrap()), (b"new".to_vec(), b"mtl".to_vec()));
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn a_directory_appears_whole_or_not_at_all() {
+        let dir = tempfile::tempdir().unwrap();
+        let target = dir.path().join("tiles");
+        let staged = StagedDirectory::new(&target).unwrap();
+        staged.write("0/0/0.glb", b"tile").unwrap();
+        assert!(staged.write("../x", b"").is_err() && !target.exists());
+        drop(staged);
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+
+        fs::create_dir(&target).unwrap();
+        let staged = StagedDirectory::new(&target).unwrap();
+        staged.write("0/0/0.glb", b"tile").unwrap();
+        staged.publish().unwrap();
+        assert_eq!(fs::read(target.join("0/0/0.glb")).unwrap(), b"tile");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+        for taken in [&target, &target.join("0/0/0.glb"), &dir.path().join("none/tiles")] {
+            assert!(StagedDirectory::new(taken).is_err(), "{}", taken.display());
+        }
     }
 
     #[test]

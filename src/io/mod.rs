@@ -14,8 +14,10 @@ pub mod obj;
 pub mod off;
 pub mod ply;
 pub mod pm;
+pub mod quantized_mesh;
 pub mod stl;
 pub(crate) mod text;
+pub mod tileset;
 
 use crate::scene::Scene;
 
@@ -83,6 +85,8 @@ pub struct EncodeOptions {
     pub text: bool,
     /// Stem of the output file, for the names of files beside it.
     pub stem: String,
+    /// Images are not part of the output: glTF refers to them by their URIs, which must lead to them from the output.
+    pub link_images: bool,
     /// Facts about the content, by name: comments in the head of a PLY file, extras of the (first) scene in glTF; others hold none.
     pub facts: Vec<(String, serde_json::Value)>,
 }

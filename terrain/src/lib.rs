@@ -16,6 +16,7 @@
 
 pub mod block;
 mod cache;
+mod geodetic;
 mod georeference;
 mod grid;
 mod hillshade;
@@ -26,6 +27,7 @@ mod summary;
 pub mod tin;
 
 pub use cache::BlockCache;
+pub use geodetic::{Geodetic, GeodeticError};
 pub use georeference::{Affine, Crs, CrsKind, GeoKeys, Georeference, SampleAt, metres_per_degree};
 pub use grid::{Grid, GridError};
 pub use hillshade::{hillshade, mean_slope};

@@ -23,6 +23,11 @@ pub(crate) struct DressArgs {
 }
 
 impl DressArgs {
+    /// Whether a picture, or a place for one, was asked for.
+    pub(crate) fn drapes(&self) -> bool {
+        self.uv || self.texture.is_some()
+    }
+
     /// Reads the picture.
     pub(crate) fn dress(&self, space: Space, source: &GridFile) -> Result<Dress, Failure> {
         let image = self.texture.as_ref().map(|path| {

@@ -4,7 +4,10 @@ mod build;
 mod dress;
 mod info;
 pub(crate) mod input;
+mod tile_report;
+mod tiles;
 mod tin;
+mod tin_report;
 
 use super::Failure;
 

@@ -2,19 +2,20 @@
 
 use super::dress::DressArgs;
 use super::input::{GridInput, known_spacing, whole};
+use super::tiles::{self, Job, TileFormat};
+use super::tin_report::{ErrorReport, Report, Seconds, Verified};
 use crate::cli::Failure;
 use crate::cli::args::{self, Output};
-use crate::cli::common::{self, Warnings, short, thousands};
+use crate::cli::common::{self, Warnings, thousands};
 use crate::cli::control::{Interrupt, Progress};
 use crate::cli::picture::PictureArgs;
 use clap::ValueEnum;
-use progmesh::ground::{self, Dress, Space};
+use progmesh::ground::{self, Dress, Globe, Space};
 use progmesh::io::Format;
 use progmesh::io::grid::GridFile;
 use progmesh::simplify::Control;
 use progmesh::terrain::Grid;
 use progmesh::terrain::tin::{self, Contract, Made, Method, Options, TinError, Verdict};
-use serde::Serialize;
 use serde_json::json;
 use std::time::Instant;
 
@@ -31,6 +32,8 @@ Examples:
   progmesh terrain tin alps.tif alps.obj --triangles 50000 --json
   progmesh terrain tin alps.tif alps.ply --max-error 5 --method greedy --verify
   progmesh terrain tin alps.tif alps.glb --max-error 5 --texture orthophoto.jpg
+  progmesh terrain tin alps.tif tiles --max-error 5 --tiles 8
+  progmesh terrain tin alps.tif terrain --max-error 5 --tiles 8 --tile-format quantized-mesh
   progmesh terrain tin dem.raw dem.stl --size 1025x1025 --type u16 --max-error 3 --on-samples
 
 Exit code 1 means: done and written, but the outline takes more triangles than asked for, or --verify found a fault.")]
@@ -70,6 +73,17 @@ pub(crate) struct Args {
     /// world: multiply heights by this [default: 1]
     #[arg(long, value_name = "F", value_parser = factor, allow_negative_numbers = true, help_heading = "Space")]
     exaggeration: Option<f64>,
+
+    /// Write a directory OUT of N x N tiles, whose borders are the same from both sides to the bit, and of all levels above, each with a
+    /// quarter of the tiles and twice the error
+    ///
+    /// Quantized-mesh tiles lie where the geodetic scheme has them: about N along the longer side.
+    #[arg(long, value_name = "N", value_parser = args::positive, allow_negative_numbers = true,
+          requires = "max_error", conflicts_with = "triangles", help_heading = "Tiles")]
+    tiles: Option<usize>,
+    /// What tiles are written as
+    #[arg(long, value_enum, default_value_t = TileFormat::Tileset, requires = "tiles", help_heading = "Tiles")]
+    tile_format: TileFormat,
 
     #[command(flatten)]
     dress: DressArgs,
@@ -172,24 +186,40 @@ impl Args {
         let start = Instant::now();
         self.output.leave_room_for(self.json)?;
         let mut warnings = Warnings::new(self.quiet);
-        let format = self.output.format(&mut warnings)?;
-        let mut drawing = self.picture.drawing()?;
         let interrupt = Interrupt::watch();
+        let report = match self.tiles {
+            Some(across) => self.tile(start, across, &interrupt, &mut warnings)?,
+            None => self.one(start, &interrupt, &mut warnings)?,
+        };
+        let report = Report { warnings: warnings.all, ..report };
+        if !self.quiet {
+            common::note(&report.text());
+        }
+        if self.json {
+            common::print_json(&report)?;
+        }
+        self.judge(&report)
+    }
+
+    /// One network.
+    fn one(&self, start: Instant, interrupt: &Interrupt, warnings: &mut Warnings) -> Result<Report, Failure> {
+        let format = self.output.format(warnings)?;
+        let mut drawing = self.picture.drawing()?;
         let file = self.input.name();
-        let report = common::in_pool(self.threads, || {
-            let source = self.input.open(&mut warnings)?;
-            let space = self.space(format, &source, &mut warnings)?;
+        common::in_pool(self.threads, || {
+            let source = self.input.open(warnings)?;
+            let space = self.space(format, &source, warnings)?;
             let dress = self.dress.dress(space, &source)?;
             let grid = whole(&file, &source)?;
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
             let making = Instant::now();
-            let progress = Progress::new(&interrupt, self.quiet, "triangulating");
+            let progress = Progress::new(interrupt, self.quiet, "triangulating");
             let made = tin::triangulate(&grid, &self.options(), &Watch(&progress))
                 .map_err(|e| failure(&file, &e))?;
             drop(progress);
             let make = making.elapsed().as_secs_f64();
-            warnings.say(isolated(&made).map(|w| format!("{file}: {w}")));
+            warnings.say(isolated_samples(made.isolated).map(|w| format!("{file}: {w}")));
             let verifying = Instant::now();
             let verdict = self.verify.then(|| {
                 tin::verify(&grid, &made.tin, self.max_error.unwrap_or(f64::INFINITY), self.error.contract())
@@ -200,8 +230,8 @@ impl Args {
             }
             let writing = Instant::now();
             let scene = ground::scene(&made.tin, &grid, space, &dress, "terrain");
-            let facts = facts(&source, &grid, space, &made);
-            self.output.write_with_facts(format, &scene, facts, &interrupt, &mut warnings)?;
+            let facts = facts(&source, &grid, space, made.errors.max);
+            self.output.write_with_facts(format, &scene, facts, interrupt, warnings)?;
             let write = writing.elapsed().as_secs_f64();
             if let Some(d) = &mut drawing {
                 let (space, dress) =
@@ -214,15 +244,85 @@ impl Args {
             let total = start.elapsed().as_secs_f64();
             let seconds = Seconds { read, make, verify, write, draw, total };
             Ok(self.report(&file, &grid, space, &made, verdict.as_ref(), seconds))
-        })?;
-        let report = Report { warnings: warnings.all, ..report };
-        if !self.quiet {
-            common::note(&report.text());
+        })
+    }
+
+    /// Tiles.
+    fn tile(
+        &self,
+        start: Instant,
+        across: usize,
+        interrupt: &Interrupt,
+        warnings: &mut Warnings,
+    ) -> Result<Report, Failure> {
+        let target = self.output.directory()?;
+        if self.picture.drawing()?.is_some() {
+            return Err(Failure::Usage("--png draws one network: leave out --tiles".into()));
         }
-        if self.json {
-            common::print_json(&report)?;
+        if self.space == Some(SpaceName::Grid) {
+            return Err(Failure::Usage("tiles stand in the world: leave out --space grid".into()));
         }
-        self.judge(&report)
+        if !matches!(self.method, MethodName::Best | MethodName::Greedy)
+            || self.error == ContractName::Surface
+        {
+            return Err(Failure::Usage(
+                "--tiles goes with --method best or greedy and --error samples: borders of tiles know their own samples only"
+                    .into(),
+            ));
+        }
+        if self.tile_format == TileFormat::QuantizedMesh && (self.spacing.is_some() || self.dress.drapes()) {
+            return Err(Failure::Usage(
+                "quantized-mesh tiles lie on the globe, and clients lay pictures over them: leave out --spacing, --uv and --texture"
+                    .into(),
+            ));
+        }
+        let file = self.input.name();
+        common::in_pool(self.threads, || {
+            let source = self.input.open(warnings)?;
+            let globe = tiles::is_geographic(&source)
+                && self.spacing.is_none()
+                && self.tile_format != TileFormat::Glb;
+            let flat = match globe {
+                // Lengths of steps are not asked for there.
+                true => Space::World { spacing: [1.0; 2], exaggeration: self.exaggeration.unwrap_or(1.0) },
+                false => self.space(Format::Glb, &source, warnings)?,
+            };
+            let dress = self.dress.dress(flat, &source)?;
+            let grid = whole(&file, &source)?;
+            let space = match (source.georeference.transform, flat) {
+                (Some(transform), Space::World { exaggeration, .. }) if globe => {
+                    Space::Globe(Globe::new(&grid, transform, exaggeration))
+                }
+                _ => flat,
+            };
+            let read = start.elapsed().as_secs_f64();
+            interrupt.be_graceful();
+            let making = Instant::now();
+            let error = self.max_error.unwrap_or_default();
+            let job = Job {
+                file: &file,
+                source: &source,
+                space,
+                dress: &dress,
+                facts: facts(&source, &grid, space, error),
+                options: self.options(),
+                error,
+                format: self.tile_format,
+                verify: self.verify,
+            };
+            let outcome = job.run(&grid, across, &target, (interrupt, self.quiet), warnings)?;
+            let make = making.elapsed().as_secs_f64();
+            let [valid, isolated] = outcome.valid_and_isolated;
+            warnings.say(isolated_samples(isolated).map(|w| format!("{file}: {w}")));
+            let total = start.elapsed().as_secs_f64();
+            let seconds = Seconds { read, make, verify: 0.0, write: 0.0, draw: 0.0, total };
+            let mut made = Made::default();
+            (made.errors, made.valid, made.isolated) = (outcome.errors, valid, isolated);
+            made.grid_triangles = outcome.grid_triangles;
+            let report = self.report(&file, &grid, space, &made, outcome.verdict.as_ref(), seconds);
+            let (triangles, vertices) = (outcome.triangles, outcome.vertices);
+            Ok(Report { triangles, vertices, tiles: Some(outcome.tiles), ..report })
+        })
     }
 
     fn options(&self) -> Options {
@@ -271,7 +371,8 @@ impl Args {
     ) -> Report {
         let (space, spacing, exaggeration) = match space {
             Space::World { spacing, exaggeration } => ("world", Some(spacing), Some(exaggeration)),
-            _ => ("grid", None, None),
+            Space::Globe(globe) => ("globe", None, Some(globe.exaggeration())),
+            Space::Grid => ("grid", None, None),
         };
         Report {
             command: "terrain tin",
@@ -290,7 +391,8 @@ impl Args {
             vertices: made.tin.points.len(),
             error: ErrorReport { max: made.errors.max, rms: made.errors.rms, surface: made.errors.surface },
             step: made.step,
-            verified: verdict.map(|v| Verified::of(v, self.error)),
+            verified: verdict.map(|v| Verified::of(v, self.error.contract())),
+            tiles: None,
             space,
             spacing,
             exaggeration,
@@ -301,7 +403,8 @@ impl Args {
 
     /// Whether all that was asked for was done.
     fn judge(&self, report: &Report) -> Result<(), Failure> {
-        if report.verified.as_ref().is_some_and(|v| !v.good) {
+        let apart = report.tiles.as_ref().and_then(|t| t.border_mismatches).is_some_and(|n| n > 0);
+        if apart || report.verified.as_ref().is_some_and(|v| !v.good) {
             return Err(Failure::Missed(format!("{}: the check found a fault; this is a bug", report.file)));
         }
         match self.triangles {
@@ -330,18 +433,18 @@ fn picture_space(source: &GridFile, grid: &Grid, space: Space) -> Space {
     Space::World { spacing: [1.0, 1.0], exaggeration }
 }
 
-fn isolated(made: &Made) -> Option<String> {
-    (made.isolated > 0).then(|| {
+fn isolated_samples(count: usize) -> Option<String> {
+    (count > 0).then(|| {
         format!(
             "{} valid samples have no two valid neighbours to make a triangle with: left out",
-            thousands(made.isolated)
+            thousands(count)
         )
     })
 }
 
 /// What a file says about where it lies.
-fn facts(source: &GridFile, grid: &Grid, space: Space, made: &Made) -> Vec<(String, serde_json::Value)> {
-    let mut facts = vec![("terrain_error".to_string(), json!(made.errors.max))];
+fn facts(source: &GridFile, grid: &Grid, space: Space, error: f64) -> Vec<(String, serde_json::Value)> {
+    let mut facts = vec![("terrain_error".to_string(), json!(error))];
     let place = &source.georeference;
     if let Space::World { spacing, exaggeration } = space {
         facts.push(("terrain_spacing".into(), json!(spacing)));
@@ -361,7 +464,7 @@ fn facts(source: &GridFile, grid: &Grid, space: Space, made: &Made) -> Vec<(Stri
     facts
 }
 
-fn failure(file: &str, e: &TinError) -> Failure {
+pub(super) fn failure(file: &str, e: &TinError) -> Failure {
     match e {
         TinError::Cancelled => Failure::Interrupted,
         TinError::TooFine { .. } => Failure::Input(format!("{file}: {e} (--nodata)")),
@@ -370,7 +473,7 @@ fn failure(file: &str, e: &TinError) -> Failure {
 }
 
 /// The progress bar, as `terrain` knows one.
-struct Watch<'a>(&'a Progress<'a>);
+pub(super) struct Watch<'a>(pub(super) &'a Progress<'a>);
 
 impl tin::Control for Watch<'_> {
     fn progress(&self, done: f64) {
@@ -380,122 +483,6 @@ impl tin::Control for Watch<'_> {
     fn cancelled(&self) -> bool {
         self.0.cancelled()
     }
-}
-
-/// The schema of `terrain tin --json`; docs/json.md says what each field means.
-#[derive(Serialize)]
-struct Report {
-    command: &'static str,
-    file: String,
-    columns: usize,
-    rows: usize,
-    valid: usize,
-    isolated: usize,
-    grid_triangles: usize,
-    method: &'static str,
-    on_samples: bool,
-    max_error: Option<f64>,
-    contract: &'static str,
-    max_triangles: Option<usize>,
-    triangles: usize,
-    vertices: usize,
-    error: ErrorReport,
-    step: Option<usize>,
-    verified: Option<Verified>,
-    space: &'static str,
-    spacing: Option<[f64; 2]>,
-    exaggeration: Option<f64>,
-    seconds: Seconds,
-    warnings: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct ErrorReport {
-    max: f64,
-    rms: f64,
-    surface: f64,
-}
-
-#[derive(Serialize)]
-struct Verified {
-    good: bool,
-    exact: bool,
-    max: f64,
-    beyond: usize,
-    surface_max: Option<f64>,
-    pieces_beyond: usize,
-    uncovered: usize,
-    over_void: usize,
-    turned: usize,
-    flat: usize,
-    excess_area: i64,
-}
-
-impl Verified {
-    fn of(v: &Verdict, contract: ContractName) -> Self {
-        Verified {
-            good: v.is_good(),
-            exact: v.exact,
-            max: v.max_error,
-            beyond: v.beyond,
-            surface_max: (contract == ContractName::Surface).then_some(v.surface_error),
-            pieces_beyond: v.pieces_beyond,
-            uncovered: v.uncovered,
-            over_void: v.over_void,
-            turned: v.turned,
-            flat: v.flat,
-            excess_area: v.excess_area,
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct Seconds {
-    read: f64,
-    make: f64,
-    verify: f64,
-    write: f64,
-    draw: f64,
-    total: f64,
-}
-
-impl Report {
-    fn text(&self) -> String {
-        let t = &self.seconds;
-        let step = self.step.map_or(String::new(), |k| format!(", every {}", ordinal(k)));
-        let verified = match &self.verified {
-            Some(v) if v.good => "; verified",
-            Some(_) => "; NOT as it should be",
-            None => "",
-        };
-        format!(
-            "{}: {} x {} samples -> {} triangles, error {} (rms {}, between samples {}){verified}; {}{step}, {:.3} s (read {:.3}, make {:.3}, write {:.3})",
-            self.file,
-            thousands(self.columns),
-            thousands(self.rows),
-            thousands(self.triangles),
-            short(self.error.max),
-            short(self.error.rms),
-            short(self.error.surface),
-            self.method,
-            t.total,
-            t.read,
-            t.make,
-            t.write
-        )
-    }
-}
-
-/// `4th`.
-fn ordinal(n: usize) -> String {
-    let ending = match (n % 100, n % 10) {
-        (11..=13, _) => "th",
-        (_, 1) => "st",
-        (_, 2) => "nd",
-        (_, 3) => "rd",
-        _ => "th",
-    };
-    format!("{n}{ending}")
 }
 
 #[cfg(test)]
@@ -509,13 +496,5 @@ mod tests {
         for bad in ["", "0", "1,-1", "nan", "1,2,3", "inf"] {
             assert!(spacing(bad).is_err(), "{bad}");
         }
-    }
-
-    #[test]
-    fn ordinals_are_english() {
-        assert_eq!(
-            [1, 2, 3, 4, 11, 22, 113].map(ordinal),
-            ["1st", "2nd", "3rd", "4th", "11th", "22nd", "113th"]
-        );
     }
 }

@@ -22,6 +22,7 @@ use serde_json::{Map, Value, json};
 /// Errors: a position that is not finite in f32; more than 4 GiB.
 pub fn encode(scene: &Scene, format: Format, options: &EncodeOptions) -> Result<Encoded, EncodeError> {
     let mut writer = Writer::new(format);
+    writer.link_images = options.link_images;
     let (mut document, _) = begin(scene, &mut writer)?;
     if let Some(Value::Object(first)) =
         document.pointer_mut("/scenes/0").filter(|_| !options.facts.is_empty())
@@ -176,6 +177,8 @@ pub(super) struct Writer {
     pub(super) binary: Vec<u8>,
     pub(super) base_view: usize,
     pub(super) base_accessor: usize,
+    /// Images are referred to, and not put into the file or beside it.
+    pub(super) link_images: bool,
     pools: Vec<Pool>,
     accessors: Vec<Value>,
     side: Vec<(String, Vec<u8>)>,
@@ -205,6 +208,7 @@ impl Writer {
             binary: Vec::new(),
             base_view: 0,
             base_accessor: 0,
+            link_images: false,
             pools: Vec::new(),
             accessors: Vec::new(),
             side: Vec::new(),

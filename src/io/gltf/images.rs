@@ -165,6 +165,14 @@ pub(super) fn embed(scene: &Scene, writer: &mut Writer) -> Textures {
         if let Some(name) = image.name.as_ref().or(image.uri.as_ref().filter(|u| !u.starts_with("data:"))) {
             json.insert("name".into(), json!(name));
         }
+        let linked = image.uri.as_ref().filter(|_| writer.link_images);
+        if let Some(uri) = linked {
+            json.insert("uri".into(), json!(percent_encode(uri)));
+            out.by_image.push(Some(out.textures.len()));
+            out.textures.push(json!({"sampler": 0, "source": out.images.len()}));
+            out.images.push(Value::Object(json));
+            continue;
+        }
         match (&image.data, image.data.as_deref().and_then(sniff)) {
             (Some(data), Some(mime @ ("image/png" | "image/jpeg"))) => {
                 if writer.is_binary() {

@@ -20,6 +20,7 @@
 //! ```
 
 mod blocks;
+mod borders;
 mod delaunay;
 mod field;
 mod fill;
@@ -40,6 +41,7 @@ mod thin;
 mod tiles;
 mod verify;
 
+pub use borders::Borders;
 pub use make::triangulate;
 pub use options::{Contract, Control, Errors, Made, Method, Options, Quiet, Tin, TinError};
 pub use tiles::{Cuts, Level, Tiling};

@@ -122,7 +122,7 @@ pub struct Errors {
 }
 
 /// A network and what it keeps.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Made {
     /// The network.
