@@ -200,3 +200,17 @@ fn a_texture_is_laid_over_the_whole_grid() {
     p.run(&format!("terrain tin hills.raw o.glb --max-error 6 --texture none.png {RAW}"))
         .failed(3, "none.png");
 }
+
+#[test]
+fn voids_are_filled_when_asked_and_said_to_be_invented() {
+    let p = place();
+    let plain = tin(&p, "out.ply --max-error 6");
+    assert_eq!((&plain["filled"], &plain["verified"]["good"]), (&Value::Null, &true.into()));
+    let run = p.done(&format!("terrain tin hills.raw out.ply --max-error 6 --fill --verify --json {RAW}"));
+    let filled = run.json();
+    let n = filled["filled"].as_u64().unwrap();
+    assert!(n > 80 && filled["valid"].as_u64() == Some(48 * 40), "{n}");
+    assert_eq!(filled["valid"].as_u64().unwrap() - plain["valid"].as_u64().unwrap(), n);
+    assert_eq!(filled["verified"]["good"], true);
+    assert!(run.stderr.contains("invented"), "{}", run.stderr);
+}

@@ -1071,6 +1071,8 @@ struct TerrainTin {
     rows: usize,
     valid: usize,
     isolated: usize,
+    #[serde(deserialize_with = "present")]
+    filled: Option<usize>,
     grid_triangles: usize,
     method: String,
     on_samples: bool,
@@ -1086,6 +1088,8 @@ struct TerrainTin {
     step: Option<usize>,
     #[serde(deserialize_with = "present")]
     verified: Option<TerrainVerified>,
+    #[serde(deserialize_with = "present")]
+    tiles: Option<TerrainTiles>,
     space: String,
     #[serde(deserialize_with = "present")]
     spacing: Option<[f64; 2]>,
@@ -1101,6 +1105,34 @@ struct TerrainError {
     max: f64,
     rms: f64,
     surface: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TerrainTiles {
+    format: String,
+    directory: String,
+    resampled: bool,
+    #[serde(deserialize_with = "present")]
+    border_mismatches: Option<usize>,
+    levels: Vec<TerrainLevel>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TerrainLevel {
+    level: u32,
+    max_error: f64,
+    error: f64,
+    tiles: usize,
+    triangles: usize,
+    vertices: usize,
+    bytes: usize,
+    sag: f64,
+    #[serde(deserialize_with = "present")]
+    height_step: Option<f64>,
+    #[serde(deserialize_with = "present")]
+    border_mismatches: Option<usize>,
 }
 
 #[derive(Deserialize)]
@@ -1200,6 +1232,11 @@ fn terrain_tin() {
     let regular: TerrainTin =
         serde_json::from_str(&p.done(&format!("{TERRAIN} --method regular --space grid")).stdout).unwrap();
     assert!(regular.step.is_some() && regular.spacing.is_none() && tin.spacing.is_some());
+    let tiled = TERRAIN.replace("out.glb", "tiles") + " --tiles 2 --fill";
+    let tiled: TerrainTin = serde_json::from_str(&p.done(&tiled).stdout).unwrap();
+    let tiles = tiled.tiles.unwrap();
+    assert_eq!((tiles.levels.len(), tiles.border_mismatches, tiled.filled), (2, Some(0), Some(0)));
+    assert!(tin.tiles.is_none() && tin.filled.is_none() && tiles.levels[1].tiles == 4);
 }
 
 #[derive(Deserialize)]

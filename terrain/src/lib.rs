@@ -16,6 +16,7 @@
 
 pub mod block;
 mod cache;
+mod fill;
 mod geodetic;
 mod georeference;
 mod grid;
@@ -27,6 +28,7 @@ mod summary;
 pub mod tin;
 
 pub use cache::BlockCache;
+pub use fill::{Filled, fill_voids};
 pub use geodetic::{Geodetic, GeodeticError};
 pub use georeference::{Affine, Crs, CrsKind, GeoKeys, Georeference, SampleAt, metres_per_degree};
 pub use grid::{Grid, GridError};

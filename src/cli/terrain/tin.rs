@@ -14,8 +14,8 @@ use progmesh::ground::{self, Dress, Globe, Space};
 use progmesh::io::Format;
 use progmesh::io::grid::GridFile;
 use progmesh::simplify::Control;
-use progmesh::terrain::Grid;
 use progmesh::terrain::tin::{self, Contract, Made, Method, Options, TinError, Verdict};
+use progmesh::terrain::{Grid, fill_voids};
 use serde_json::json;
 use std::time::Instant;
 
@@ -73,6 +73,10 @@ pub(crate) struct Args {
     /// world: multiply heights by this [default: 1]
     #[arg(long, value_name = "F", value_parser = factor, allow_negative_numbers = true, help_heading = "Space")]
     exaggeration: Option<f64>,
+
+    /// Fill voids that do not reach the border of the grid from their rims, as a membrane stretched over them: invented heights
+    #[arg(long, help_heading = "Voids")]
+    fill: bool,
 
     /// Write a directory OUT of N x N tiles, whose borders are the same from both sides to the bit, and of all levels above, each with a
     /// quarter of the tiles and twice the error
@@ -211,6 +215,7 @@ impl Args {
             let space = self.space(format, &source, warnings)?;
             let dress = self.dress.dress(space, &source)?;
             let grid = whole(&file, &source)?;
+            let (grid, filled) = self.filled(&file, grid, warnings);
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
             let making = Instant::now();
@@ -243,7 +248,8 @@ impl Args {
             let draw = drawing.as_ref().map_or(0.0, |d| d.seconds);
             let total = start.elapsed().as_secs_f64();
             let seconds = Seconds { read, make, verify, write, draw, total };
-            Ok(self.report(&file, &grid, space, &made, verdict.as_ref(), seconds))
+            let report = self.report(&file, &grid, space, &made, verdict.as_ref(), seconds);
+            Ok(Report { filled, ..report })
         })
     }
 
@@ -289,6 +295,7 @@ impl Args {
             };
             let dress = self.dress.dress(flat, &source)?;
             let grid = whole(&file, &source)?;
+            let (grid, filled) = self.filled(&file, grid, warnings);
             let space = match (source.georeference.transform, flat) {
                 (Some(transform), Space::World { exaggeration, .. }) if globe => {
                     Space::Globe(Globe::new(&grid, transform, exaggeration))
@@ -320,9 +327,23 @@ impl Args {
             (made.errors, made.valid, made.isolated) = (outcome.errors, valid, isolated);
             made.grid_triangles = outcome.grid_triangles;
             let report = self.report(&file, &grid, space, &made, outcome.verdict.as_ref(), seconds);
+
             let (triangles, vertices) = (outcome.triangles, outcome.vertices);
-            Ok(Report { triangles, vertices, tiles: Some(outcome.tiles), ..report })
+            Ok(Report { filled, triangles, vertices, tiles: Some(outcome.tiles), ..report })
         })
+    }
+
+    /// With `--fill` the grid without its inner voids, and how many samples that were.
+    fn filled(&self, file: &str, grid: Grid, warnings: &mut Warnings) -> (Grid, Option<usize>) {
+        if !self.fill {
+            return (grid, None);
+        }
+        let (grid, filled) = fill_voids(&grid);
+        warnings.say((filled.samples > 0).then(|| {
+            let (samples, voids) = (thousands(filled.samples), thousands(filled.voids));
+            format!("{file}: {samples} void samples ({voids} voids) were filled from their rims: these heights are invented")
+        }));
+        (grid, Some(filled.samples))
     }
 
     fn options(&self) -> Options {
@@ -393,6 +414,7 @@ impl Args {
             step: made.step,
             verified: verdict.map(|v| Verified::of(v, self.error.contract())),
             tiles: None,
+            filled: None,
             space,
             spacing,
             exaggeration,

@@ -14,6 +14,7 @@ pub(super) struct Report {
     pub rows: usize,
     pub valid: usize,
     pub isolated: usize,
+    pub filled: Option<usize>,
     pub grid_triangles: usize,
     pub method: &'static str,
     pub on_samples: bool,
