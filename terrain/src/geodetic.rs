@@ -234,7 +234,7 @@ mod tests {
         // A turn of 360 brings it in.
         let east = Geodetic::new(&grid, Affine::north_up([200.0, 10.0], [1.0, 1.0]), 1).unwrap();
         assert!((east.transform().0[2] + 160.0).abs() < 1.0);
-        let tiny = Affine::north_up([0.0, 0.0], [1e-7, 1e-7]);
-        assert!(Geodetic::new(&grid, tiny, 1).is_err());
+        let cell = Geodetic::new(&plane(2, 2), Affine::north_up([0.7, 0.7], [1.0, 1.0]), 1);
+        assert_eq!(cell.map(|_| ()).unwrap_err(), GeodeticError::TooSmall);
     }
 }

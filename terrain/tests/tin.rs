@@ -192,3 +192,86 @@ fn work_can_be_stopped() {
         assert!(stopped == Some(TinError::Cancelled) || method == Method::Greedy, "{method:?}");
     }
 }
+
+/// Whether sides of triangles lead straight along a line; by looking at all of them.
+fn follows(made: &Made, [a, b]: [[u32; 2]; 2]) -> bool {
+    let at = |p: [u32; 2]| [i64::from(p[0]), i64::from(p[1])];
+    let (from, to) = (at(a), at(b));
+    let along = |p: [i64; 2]| (p[0] - from[0]) * (to[0] - from[0]) + (p[1] - from[1]) * (to[1] - from[1]);
+    let beside = |p: [i64; 2]| (p[0] - from[0]) * (to[1] - from[1]) - (p[1] - from[1]) * (to[0] - from[0]);
+    let mut pieces: Vec<[i64; 2]> = vec![];
+    for t in &made.tin.triangles {
+        for i in 0..3 {
+            let ends = [t[i], t[(i + 1) % 3]].map(|v| at(made.tin.points[v as usize]));
+            if ends.iter().all(|&p| beside(p) == 0) {
+                let mut piece = ends.map(along);
+                piece.sort_unstable();
+                pieces.push(piece);
+            }
+        }
+    }
+    pieces.sort_unstable();
+    let reached = pieces.into_iter().fold(0, |r, [x, y]| if x <= r { r.max(y) } else { r });
+    reached >= along(to)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+
+    /// A breakline is there straight where everything is valid; whatever lines there are, the error is kept and all is covered.
+    #[test]
+    fn sides_follow_breaklines(
+        heights in proptest::collection::vec(-30..30i32, 169),
+        void in proptest::collection::vec(0..100u32, 169),
+        share in prop_oneof![Just(0u32), Just(12)],
+        lines in proptest::collection::vec(proptest::array::uniform2(proptest::array::uniform2(0..13u32)), 1..6),
+        error in 1..40u32,
+    ) {
+        let height = |i: usize| if void[i] < share { f64::NAN } else { f64::from(heights[i]) };
+        let grid = Grid::new(13, 13, (0..169).map(height).collect()).unwrap();
+        for method in [Method::Greedy, Method::Best] {
+            for lines in [&lines[..], &lines[..1]] {
+                let options = Options::default()
+                    .with_max_error(f64::from(error))
+                    .with_method(method)
+                    .with_breaklines(lines.to_vec());
+                match triangulate(&grid, &options, &Quiet) {
+                    Ok(_) => {
+                        let made = make(&grid, &options);
+                        if share == 0 && lines.len() == 1 {
+                            prop_assert_eq!((made.bent, made.outside), (0, 0));
+                            prop_assert!(follows(&made, lines[0]), "{:?}", lines[0]);
+                        }
+                        if made.bent == 0 && made.outside == 0 {
+                            for &line in lines {
+                                prop_assert!(follows(&made, line), "{:?}", line);
+                            }
+                        }
+                    }
+                    Err(e) => prop_assert_eq!(e, TinError::Nothing),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_breakline_stays_while_the_ground_beside_it_is_thinned() {
+    let grid = rough(90, 70);
+    let lines = vec![[[5, 60], [80, 12]], [[80, 12], [88, 69]], [[10, 3], [10, 40]]];
+    let options = Options::default().with_max_error(6.0);
+    let plain = make(&grid, &options);
+    let made = make(&grid, &options.clone().with_breaklines(lines.clone()));
+    // One crosses nothing, two meet at a sample.
+    assert_eq!((made.bent, made.outside), (0, 0));
+    for &line in &lines {
+        assert!(follows(&made, line) && !follows(&plain, line), "{line:?}");
+    }
+    assert!(made.tin.triangles.len() < plain.tin.triangles.len() + 120);
+    let refused =
+        |options: Options| triangulate(&grid, &options.with_breaklines(lines.clone()), &Quiet).unwrap_err();
+    assert_eq!(refused(options.clone().with_method(Method::Regular)), TinError::NoBreaklines);
+    assert_eq!(refused(options.clone().with_contract(Contract::Surface)), TinError::NoBreaklines);
+    let outside = options.with_breaklines(vec![[[0, 0], [90, 5]]]);
+    assert_eq!(triangulate(&grid, &outside, &Quiet).unwrap_err(), TinError::BadBreakline([[0, 0], [90, 5]]));
+}

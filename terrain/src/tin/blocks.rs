@@ -43,13 +43,17 @@ impl Network {
         for &v in self.triangles.as_flattened() {
             uses[v as usize] += 1;
         }
+        let mut stays = vec![false; self.vertices.len()];
+        for &v in self.kept.as_flattened() {
+            stays[v as usize] = true;
+        }
         let blocks = self.blocks(field, pass.shift);
         let (count, finished) = (blocks.len(), AtomicUsize::new(0));
         let improved = parallel::map(blocks, |block| {
             if control.cancelled() {
                 return None;
             }
-            let improved = self.improve_block(field, pass.rules, block, &uses);
+            let improved = self.improve_block(field, pass.rules, block, &uses, &stays);
             let part = (finished.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64;
             control.progress(pass.done[0] + part * (pass.done[1] - pass.done[0]));
             Some(improved)
@@ -95,7 +99,14 @@ impl Network {
         blocks
     }
 
-    fn improve_block(&self, field: &Field, rules: Rules, block: Block, uses: &[u32]) -> Improved {
+    fn improve_block(
+        &self,
+        field: &Field,
+        rules: Rules,
+        block: Block,
+        uses: &[u32],
+        stays: &[bool],
+    ) -> Improved {
         let mut inside = vec![0u32; block.vertices.len()];
         for &v in block.triangles.as_flattened() {
             inside[v as usize] += 1;
@@ -105,10 +116,19 @@ impl Network {
         let vertex = |(i, &v): (usize, &u32)| {
             let at = self.vertices[v as usize];
             let locked = inside[i] != uses[v as usize] || rules.border_stays && on_border(at);
-            Vertex { at, triangle: NONE, locked }
+            Vertex { at, triangle: NONE, locked, kept: stays[v as usize] }
         };
         let vertices = block.vertices.iter().enumerate().map(vertex).collect();
         let mut patch = Patch::new(field, rules, vertices, block.triangles.clone());
+        if !self.kept.is_empty() {
+            let sides = block.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+            patch.kept = sides
+                .map(|[a, b]| [a.min(b), a.max(b)])
+                // Vertices of blocks are in order.
+                .filter(|side| self.kept.binary_search(&side.map(|v| block.vertices[v as usize])).is_ok())
+                .collect();
+            patch.kept.sort_unstable();
+        }
         patch.improve(&mut Scratch::default());
         let heights = patch.vertices.iter().map(|v| v.at.z).collect();
         patch.triangles.retain(|t| t[0] != NONE);

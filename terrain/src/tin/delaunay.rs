@@ -17,14 +17,14 @@ pub(super) struct Triangulation {
     pub points: Vec<(i32, i32)>,
     /// Corners of all triangles.
     pub corner: Vec<u32>,
-    across: Vec<u32>,
+    pub(super) across: Vec<u32>,
     /// Triangles outside of the valid region; empty when there are none.
     pub outside: Vec<bool>,
     /// Triangles changed since the list was last emptied; some twice.
     pub changed: Vec<u32>,
-    stack: Vec<u32>,
+    pub(super) stack: Vec<u32>,
     /// Where the last walk ended.
-    last: u32,
+    pub(super) last: u32,
     wide: bool,
 }
 
@@ -40,12 +40,12 @@ pub(super) enum Place {
 }
 
 #[inline]
-fn next(side: u32) -> u32 {
+pub(super) fn next(side: u32) -> u32 {
     if side % 3 == 2 { side - 2 } else { side + 1 }
 }
 
 #[inline]
-fn previous(side: u32) -> u32 {
+pub(super) fn previous(side: u32) -> u32 {
     if side.is_multiple_of(3) { side + 2 } else { side - 1 }
 }
 
@@ -77,7 +77,7 @@ impl Triangulation {
     }
 
     #[inline]
-    fn point(&self, side: u32) -> (i32, i32) {
+    pub(super) fn point(&self, side: u32) -> (i32, i32) {
         self.points[self.corner[side as usize] as usize]
     }
 
@@ -97,7 +97,7 @@ impl Triangulation {
         !self.outside.is_empty() && self.outside[t as usize]
     }
 
-    fn link(&mut self, a: u32, b: u32, fixed: bool) {
+    pub(super) fn link(&mut self, a: u32, b: u32, fixed: bool) {
         let fixed = if fixed { FIXED } else { 0 };
         self.across[a as usize] = b | fixed;
         if b != HULL {
@@ -187,7 +187,7 @@ impl Triangulation {
     }
 
     /// Flips until the sides on the stack, and those that come up, are locally Delaunay.
-    fn flip_all(&mut self) {
+    pub(super) fn flip_all(&mut self) {
         while let Some(side) = self.stack.pop() {
             let across = self.across[side as usize];
             if across & FIXED != 0 || across == HULL {
@@ -204,7 +204,7 @@ impl Triangulation {
     }
 
     /// Exchanges the diagonal of the quadrilateral on a side.
-    fn flip(&mut self, side: u32) {
+    pub(super) fn flip(&mut self, side: u32) {
         let across = self.across(side);
         let (p, q) = (self.corner[previous(side) as usize], self.corner[previous(across) as usize]);
         // side: a -> b with p opposite; across: b -> a with q opposite. Then a -> q -> p and q -> b -> p.
@@ -222,7 +222,7 @@ impl Triangulation {
     }
 
     /// Whether `q` lies within the circle through `a`, `b`, `c`, which turn to the left.
-    fn in_circle(&self, a: (i32, i32), b: (i32, i32), c: (i32, i32), q: (i32, i32)) -> bool {
+    pub(super) fn in_circle(&self, a: (i32, i32), b: (i32, i32), c: (i32, i32), q: (i32, i32)) -> bool {
         let d = |p: (i32, i32)| (i64::from(p.0 - q.0), i64::from(p.1 - q.1));
         let ((ax, ay), (bx, by), (cx, cy)) = (d(a), d(b), d(c));
         let (ap, bp, cp) = (ax * ax + ay * ay, bx * bx + by * by, cx * cx + cy * cy);

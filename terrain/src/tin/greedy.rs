@@ -1,6 +1,7 @@
 //! Greedy insertion (Garland & Heckbert 1995): a Delaunay triangulation that gets the farthest sample as a vertex, again and again.
 
 use super::Control;
+use super::breaklines::Placed;
 use super::delaunay::Triangulation;
 use super::field::{Field, Tolerance};
 use super::queue::Buckets;
@@ -20,22 +21,24 @@ pub(super) struct Goal {
 /// No sample.
 const NONE: u32 = u32::MAX;
 
-/// Inserts samples until all lie within the tolerance. `None` when cancelled.
+/// Makes lines sides, and inserts samples until all lie within the tolerance. `None` when cancelled.
 ///
 /// O(samples log vertices) in practice: each insertion looks at the samples of the triangles it changes, about six.
 pub(super) fn greedy(
     field: &Field,
     region: &Region,
     goal: Goal,
+    lines: &[[(i32, i32); 2]],
     control: &dyn Control,
-) -> Option<Triangulation> {
+) -> Option<(Triangulation, Placed)> {
     let mut mesh = Triangulation::new(field.columns, field.rows);
     region.constrain(&mut mesh);
+    let placed = mesh.constrain_lines(lines);
     refine(field, &mut mesh, goal, control)?;
     while goal.surface && mend(field, &mut mesh, goal) {
         refine(field, &mut mesh, goal, control)?;
     }
-    Some(mesh)
+    Some((mesh, placed))
 }
 
 /// Inserts a sample beside where a side leaves the tolerance most, for every triangle that has such a side; false if none has.

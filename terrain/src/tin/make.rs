@@ -1,6 +1,7 @@
 //! From options to a network.
 
 use super::blocks::Pass;
+use super::breaklines::Placed;
 use super::field::{Field, Tolerance};
 use super::greedy::{Goal, greedy};
 use super::network::Network;
@@ -9,6 +10,7 @@ use super::patch::Rules;
 use super::region::Region;
 use super::regular::regular;
 use crate::Grid;
+use std::cell::Cell;
 
 /// Where the blocks of a pass lie: shifted so that what one pass locked is free in the next. A third pass takes 1.3 % more triangles away, and
 /// a quarter more time (fuji, grandcanyon, N57E011).
@@ -30,12 +32,13 @@ pub fn triangulate(grid: &Grid, options: &Options, control: &dyn Control) -> Res
     if !(error >= 0.0 && error.is_finite()) {
         return Err(TinError::BadError);
     }
+    let lines = lines(grid, options)?;
     let field = Field::new(grid, error);
     let region = Region::new(&field);
     if region.triangles == 0 {
         return Err(TinError::Nothing);
     }
-    let work = Work { field: &field, region: &region, control };
+    let work = Work { field: &field, region: &region, lines: &lines, placed: Cell::default(), control };
     let (network, step) = match (options.max_error, options.triangles) {
         (None, Some(most)) if options.method != Method::Regular => work.fewer(options, most, 0.0)?,
         (asked, most) => {
@@ -54,7 +57,23 @@ pub fn triangulate(grid: &Grid, options: &Options, control: &dyn Control) -> Res
     let errors = network.errors(&field, grid.heights());
     let tin = network.into_tin(&field, [0, 0]);
     let (valid, isolated, grid_triangles) = (region.valid, region.isolated, region.triangles);
-    Ok(Made { tin, errors, valid, isolated, grid_triangles, step })
+    let Placed { bent, outside } = work.placed.get();
+    Ok(Made { tin, errors, valid, isolated, grid_triangles, step, bent, outside })
+}
+
+/// The breaklines, checked.
+fn lines(grid: &Grid, options: &Options) -> Result<Vec<[(i32, i32); 2]>, TinError> {
+    let known = matches!(options.method, Method::Greedy | Method::Best);
+    if !options.breaklines.is_empty() && (!known || options.contract != Contract::Samples) {
+        return Err(TinError::NoBreaklines);
+    }
+    let within = |&[x, y]: &[u32; 2]| (x as usize) < grid.columns() && (y as usize) < grid.rows();
+    let point = |[x, y]: [u32; 2]| (x as i32, y as i32);
+    let line = |line: &[[u32; 2]; 2]| match line.iter().all(within) {
+        true => Ok(line.map(point)),
+        false => Err(TinError::BadBreakline(*line)),
+    };
+    options.breaklines.iter().map(line).collect()
 }
 
 /// Improves what greedy insertion made. `None` when cancelled.
@@ -83,6 +102,9 @@ const TRIES: usize = 10;
 struct Work<'a> {
     field: &'a Field,
     region: &'a Region,
+    lines: &'a [[(i32, i32); 2]],
+    /// What became of the lines: the same whenever a network is made.
+    placed: Cell<Placed>,
     control: &'a dyn Control,
 }
 
@@ -165,7 +187,9 @@ impl Work<'_> {
     }
 
     fn greedy(&self, goal: Goal) -> Option<Network> {
-        Some(Network::of(&greedy(self.field, self.region, goal, self.control)?, self.field))
+        let (mesh, placed) = greedy(self.field, self.region, goal, self.lines, self.control)?;
+        self.placed.set(placed);
+        Some(Network::of(&mesh, self.field))
     }
 
     fn best(&self, rules: Rules) -> Option<Network> {

@@ -21,6 +21,7 @@
 
 mod blocks;
 mod borders;
+mod breaklines;
 mod delaunay;
 mod field;
 mod fill;

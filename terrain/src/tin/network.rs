@@ -11,6 +11,8 @@ use super::{Errors, Tin};
 pub(super) struct Network {
     pub vertices: Vec<Corner>,
     pub triangles: Vec<[u32; 3]>,
+    /// Sides that stay, the lower vertex first, sorted; their vertices stay too.
+    pub kept: Vec<[u32; 2]>,
 }
 
 /// Triangles measured by one thread at a time.
@@ -24,6 +26,7 @@ impl Network {
             // Vertices of none have no height; they go.
             vertices: mesh.points.iter().map(|&(x, y)| Corner { x, y, z: field.at(x, y) }).collect(),
             triangles: within.map(|t| mesh.corners(t)).collect(),
+            kept: mesh.inner_constraints(),
         };
         network.compact();
         network
@@ -36,7 +39,7 @@ impl Network {
             .map(|i| Corner { x: (i % columns) as i32, y: (i / columns) as i32, z: field.h[i] })
             .collect();
         let triangles = region.grid_triangles();
-        let mut network = Network { vertices, triangles };
+        let mut network = Network { vertices, triangles, kept: vec![] };
         network.compact();
         network
     }
@@ -56,7 +59,8 @@ impl Network {
             }
         }
         self.vertices.truncate(count as usize);
-        for v in self.triangles.as_flattened_mut() {
+        // Vertices keep their order, so sides do.
+        for v in self.triangles.as_flattened_mut().iter_mut().chain(self.kept.as_flattened_mut()) {
             *v = new[*v as usize];
         }
     }

@@ -60,6 +60,10 @@ pub struct Options {
     pub method: Method,
     /// Vertices keep the heights of their samples; only [`Method::Best`] moves them.
     pub on_samples: bool,
+    /// Straight lines from sample to sample, by column and row, that sides of triangles shall follow. Only for [`Method::Greedy`] and
+    /// [`Method::Best`], and an error at the samples. Where lines cross between samples both are led over the nearest one; where one leaves the
+    /// valid region it ends at the outline.
+    pub breaklines: Vec<[[u32; 2]; 2]>,
 }
 
 impl Options {
@@ -74,6 +78,13 @@ impl Options {
     #[must_use]
     pub fn with_contract(mut self, contract: Contract) -> Self {
         self.contract = contract;
+        self
+    }
+
+    /// With sides along these lines.
+    #[must_use]
+    pub fn with_breaklines(mut self, breaklines: Vec<[[u32; 2]; 2]>) -> Self {
+        self.breaklines = breaklines;
         self
     }
 
@@ -137,6 +148,10 @@ pub struct Made {
     pub grid_triangles: usize,
     /// The step of [`Method::Regular`].
     pub step: Option<usize>,
+    /// Pieces of breaklines that were led over the nearest sample, where lines cross or the valid region ends.
+    pub bent: usize,
+    /// Pieces of breaklines left out, where nothing is valid.
+    pub outside: usize,
 }
 
 /// Why there is no network.
@@ -172,6 +187,12 @@ pub enum TinError {
     /// An error that is not a number, or negative.
     #[error("an error must be a number, 0 or more")]
     BadError,
+    /// Breaklines with another method, or with an error between samples, which one may break.
+    #[error("breaklines are kept by the methods greedy and best, with an error at the samples")]
+    NoBreaklines,
+    /// A breakline with an end that is no sample.
+    #[error("the breakline from column {} row {} to column {} row {} leaves the grid", .0[0][0], .0[0][1], .0[1][0], .0[1][1])]
+    BadBreakline([[u32; 2]; 2]),
     /// Tiles of another method than greedy insertion and the best, or with an error between samples.
     #[error("tiles are made by the methods greedy and best, with an error at the samples")]
     NoTiles,

@@ -16,6 +16,8 @@ pub(super) struct Vertex {
     pub triangle: u32,
     /// Neither moves nor goes: triangles outside of the patch share it.
     pub locked: bool,
+    /// Does not go: a side that stays ends here.
+    pub kept: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -29,6 +31,8 @@ pub(super) struct Patch<'a> {
     pub(super) scale: f64,
     free: Vec<u32>,
     pub rules: Rules,
+    /// Sides that stay, the lower vertex first, sorted.
+    pub kept: Vec<[u32; 2]>,
 }
 
 /// What a network keeps while it is improved.
@@ -68,6 +72,7 @@ impl<'a> Patch<'a> {
             scale: 1.0 / rules.tolerance.quanta().max(0.5),
             free: vec![],
             rules,
+            kept: vec![],
         };
         let mut sides: Vec<(u32, u32, u32)> = Vec::with_capacity(3 * patch.triangles.len());
         for (t, corners) in patch.triangles.iter().enumerate() {
@@ -212,6 +217,13 @@ impl<'a> Patch<'a> {
                 self.across[made[m] as usize][i] = o;
             }
         }
+    }
+
+    /// Whether a side stays.
+    pub(super) fn is_kept(&self, a: u32, b: u32) -> bool {
+        self.vertices[a as usize].kept
+            && self.vertices[b as usize].kept
+            && self.kept.binary_search(&[a.min(b), a.max(b)]).is_ok()
     }
 
     /// Whether a border vertex lies on the straight line between its neighbours along the border.

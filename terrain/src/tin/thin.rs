@@ -49,7 +49,7 @@ impl Patch<'_> {
     /// By how much the energy grows without a vertex; the ring and its filling stay in `scratch`. `None` where that cannot be.
     fn removal(&self, v: u32, scratch: &mut Scratch) -> Option<f64> {
         let vertex = &self.vertices[v as usize];
-        if vertex.locked || vertex.triangle == NONE {
+        if vertex.locked || vertex.kept || vertex.triangle == NONE {
             return None;
         }
         let ring = &mut scratch.ring;
@@ -127,6 +127,9 @@ impl Patch<'_> {
                     continue;
                 }
                 let (a, b, p) = (corners[i], corners[(i + 1) % 3], corners[(i + 2) % 3]);
+                if self.is_kept(a, b) {
+                    continue;
+                }
                 let Some(q) = self.triangles[other as usize].into_iter().find(|&q| q != a && q != b) else {
                     continue;
                 };

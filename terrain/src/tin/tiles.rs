@@ -96,7 +96,7 @@ impl<'a> Tiling<'a> {
             return Err(TinError::BadError);
         }
         let known = matches!(options.method, Method::Greedy | Method::Best);
-        if !known || options.contract != Contract::Samples {
+        if !known || options.contract != Contract::Samples || !options.breaklines.is_empty() {
             return Err(TinError::NoTiles);
         }
         let field = Field::new(grid, coarsest);
@@ -245,6 +245,6 @@ impl Level<'_> {
         let errors = network.errors(&field, &heights);
         let tin = network.into_tin(&field, [x0, y0].map(|c| c as u32));
         let (valid, isolated, grid_triangles) = (region.valid, region.isolated, region.triangles);
-        Ok(Some(Made { tin, errors, valid, isolated, grid_triangles, step: None }))
+        Ok(Some(Made { tin, errors, valid, isolated, grid_triangles, ..Made::default() }))
     }
 }
