@@ -9,35 +9,36 @@ use std::collections::BTreeMap;
 
 const SIDE: usize = 81;
 
-/// Heights in decimetres.
+/// Whole metres.
 fn height(x: usize, y: usize) -> f64 {
     let (x, y) = (x as f64, y as f64);
     let hill = 300.0 * (-((x - 30.0).powi(2) + (y - 44.0).powi(2)) / 300.0).exp();
-    ((hill + 40.0 * (x * 0.21).sin() * (y * 0.17).cos() + 6.0 * (x * 0.9 + y * 0.7).sin()) * 10.0).round()
-        / 10.0
+    (hill + 40.0 * (x * 0.21).sin() * (y * 0.17).cos() + 6.0 * (x * 0.9 + y * 0.7).sin()).round()
 }
 
-/// An ESRI ASCII grid of degrees, or of metres; with a lake or without.
-fn grid(p: &Place, name: &str, geographic: bool, lake: bool) {
-    let (cell, corner) = if geographic { ("0.001", "8") } else { ("30", "500000") };
-    let mut text = format!(
-        "ncols {SIDE}\nnrows {SIDE}\nxllcenter {corner}\nyllcenter 46\ncellsize {cell}\nNODATA_value -9999\n"
-    );
-    for y in 0..SIDE {
-        let void = |x: usize| lake && (x as f64 - 40.0).hypot(y as f64 - 37.0) < 9.0;
-        let row: Vec<String> =
-            (0..SIDE).map(|x| if void(x) { "-9999".into() } else { height(x, y).to_string() }).collect();
-        text.push_str(&row.join(" "));
-        text.push('\n');
-    }
-    p.write(name, text);
-    let wkt = if geographic {
-        r#"GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]"#
-    } else {
-        r#"PROJCS["UTM",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],UNIT["metre",1]]"#
+/// A grid with a lake or without: `a.asc` with steps of 30, and `N46E008.hgt`, a square degree.
+fn grid(p: &Place, lake: bool) {
+    let height = |x: usize, y: usize| {
+        let void = lake && (x as f64 - 40.0).hypot(y as f64 - 37.0) < 9.0;
+        if void { -32_768 } else { height(x, y) as i16 }
     };
-    p.write(&name.replace(".asc", ".prj"), wkt);
+    let mut text = format!("ncols {SIDE}\nnrows {SIDE}\ncellsize 30\nNODATA_value -32768\n");
+    let mut bytes = vec![];
+    for y in 0..SIDE {
+        let row: Vec<i16> = (0..SIDE).map(|x| height(x, y)).collect();
+        text.push_str(&row.iter().map(|h| h.to_string()).collect::<Vec<_>>().join(" "));
+        text.push('\n');
+        bytes.extend(row.iter().flat_map(|h| h.to_be_bytes()));
+    }
+    p.write("a.asc", text);
+    p.write(HGT, bytes);
 }
+
+const HGT: &str = "N46E008.hgt";
+/// Its first sample, and its steps.
+const WEST: f64 = 8.0;
+const NORTH: f64 = 47.0;
+const STEP: f64 = 1.0 / 80.0;
 
 /// Vertices of a GLB and its triangles.
 struct Glb {
@@ -101,7 +102,7 @@ fn png() -> Vec<u8> {
 #[test]
 fn glb_tiles_meet_bit_by_bit_at_every_level() {
     let p = Place::new();
-    grid(&p, "a.asc", false, true);
+    grid(&p, true);
     p.write("photo.png", png());
     let report = p
         .done("terrain tin a.asc out --max-error 4 --tiles 4 --tile-format glb --verify --texture photo.png --json -q")
@@ -142,7 +143,7 @@ fn glb_tiles_meet_bit_by_bit_at_every_level() {
 #[test]
 fn heights_of_glb_tiles_are_those_of_the_grid_within_the_error() {
     let p = Place::new();
-    grid(&p, "a.asc", false, false);
+    grid(&p, false);
     p.done("terrain tin a.asc out --max-error 5 --tiles 2 --tile-format glb --exaggeration 2 -q");
     for (z, tiles, error) in [(0usize, 1usize, 10.0), (1, 2, 5.0)] {
         let mut seen = vec![false; SIDE * SIDE];
@@ -187,8 +188,8 @@ fn each_sample(t: [[f64; 3]; 3], mut f: impl FnMut(usize, usize, f64)) {
 #[test]
 fn a_tileset_is_a_tree_of_boxes_that_hold_their_tiles() {
     let p = Place::new();
-    grid(&p, "a.asc", true, false);
-    let report = p.done("terrain tin a.asc out --max-error 4 --tiles 4 --verify --json -q").json();
+    grid(&p, false);
+    let report = p.done(&format!("terrain tin {HGT} out --max-error 4 --tiles 4 --verify --json -q")).json();
     assert_eq!((&report["space"], &report["tiles"]["format"]), (&"globe".into(), &"3d-tiles".into()));
     let tileset: Value = serde_json::from_slice(&p.read("out/tileset.json")).unwrap();
     assert_eq!(tileset["asset"]["version"], "1.1");
@@ -220,8 +221,7 @@ fn a_tileset_is_a_tree_of_boxes_that_hold_their_tiles() {
         }
     }
     assert_eq!(tiles, 21);
-    // The first sample: 8 E, 46.08 N, at its height.
-    let (lon, lat, h) = (8f64.to_radians(), 46.08f64.to_radians(), height(0, 0));
+    let (lon, lat, h) = (WEST.to_radians(), NORTH.to_radians(), height(0, 0));
     let (a, b) = (6_378_137.0f64, 6_356_752.314_245f64);
     let n = a * a / ((a * lat.cos()).powi(2) + (b * lat.sin()).powi(2)).sqrt();
     let first = [
@@ -232,10 +232,14 @@ fn a_tileset_is_a_tree_of_boxes_that_hold_their_tiles() {
     let near = seen.values().map(|q| (0..3).map(|k| (q[k] - first[k]).powi(2)).sum::<f64>().sqrt());
     assert!(near.fold(f64::INFINITY, f64::min) < 0.01, "the corner is not where it should be");
     // Metres on a plane: moved to its place there.
-    grid(&p, "b.asc", false, false);
-    p.done("terrain tin b.asc plane --max-error 4 --tiles 2 -q");
+    p.done("generate terrain b.tif --size 33 -q");
+    let bounds = p.done("terrain info b.tif --json").json()["bounds"].clone();
+    p.done("terrain tin b.tif plane --max-error 40 --tiles 2 -q");
     let plane: Value = serde_json::from_slice(&p.read("plane/tileset.json")).unwrap();
-    assert_eq!(plane["root"]["transform"][12], 500_000.0 + 40.0 * 30.0);
+    for k in 0..2 {
+        let middle = (bounds[0][k].as_f64().unwrap() + bounds[1][k].as_f64().unwrap()) / 2.0;
+        assert_eq!(plane["root"]["transform"][12 + k], middle);
+    }
 }
 
 /// A tile of quantized-mesh, by its specification.
@@ -311,9 +315,10 @@ fn quantized(bytes: &[u8]) -> Quantized {
 #[test]
 fn quantized_mesh_tiles_lie_on_the_globe_and_meet_bit_by_bit() {
     let p = Place::new();
-    grid(&p, "a.asc", true, true);
-    let run =
-        p.done("terrain tin a.asc out --max-error 4 --tiles 4 --tile-format quantized-mesh --verify --json");
+    grid(&p, true);
+    let run = p.done(&format!(
+        "terrain tin {HGT} out --max-error 4 --tiles 4 --tile-format quantized-mesh --verify --json"
+    ));
     assert!(run.stderr.contains("interpolated"), "{}", run.stderr);
     let report: Value = run.json();
     let tiles = &report["tiles"];
@@ -359,7 +364,7 @@ fn quantized_mesh_tiles_lie_on_the_globe_and_meet_bit_by_bit() {
                 let corner = t.map(|v| {
                     let [u, v, h] = tile.vertices[v].map(|c| f64::from(c) / 32_767.0);
                     let degrees = [(x as f64 + u) * side - 180.0, (y as f64 + v) * side - 90.0];
-                    [(degrees[0] - 8.0) / 0.001, (46.08 - degrees[1]) / 0.001, low + h * (high - low)]
+                    [(degrees[0] - WEST) / STEP, (NORTH - degrees[1]) / STEP, low + h * (high - low)]
                 });
                 let turn = (corner[1][0] - corner[0][0]) * (corner[2][1] - corner[0][1])
                     - (corner[1][1] - corner[0][1]) * (corner[2][0] - corner[0][0]);
@@ -384,11 +389,11 @@ fn quantized_mesh_tiles_lie_on_the_globe_and_meet_bit_by_bit() {
 #[test]
 fn the_number_of_threads_does_not_show_and_nothing_is_replaced() {
     let p = Place::new();
-    grid(&p, "a.asc", true, true);
+    grid(&p, true);
     for format in ["3d-tiles", "quantized-mesh"] {
         for threads in [1, 2] {
             p.done(&format!(
-                "terrain tin a.asc {format}{threads} --max-error 6 --tiles 2 --tile-format {format} --threads {threads} -q"
+                "terrain tin {HGT} {format}{threads} --max-error 6 --tiles 2 --tile-format {format} --threads {threads} -q"
             ));
         }
         let files = |n: usize| {
@@ -421,7 +426,7 @@ fn the_number_of_threads_does_not_show_and_nothing_is_replaced() {
 #[test]
 fn what_tiles_cannot_be_is_said() {
     let p = Place::new();
-    grid(&p, "a.asc", false, false);
+    grid(&p, false);
     let fails = |arguments: &str, code: i32, text: &str| {
         p.run(&format!("terrain tin a.asc out --tiles 2 {arguments}")).failed(code, text);
         assert!(!p.exists("out"), "{arguments}");
