@@ -214,3 +214,53 @@ fn voids_are_filled_when_asked_and_said_to_be_invented() {
     assert_eq!(filled["verified"]["good"], true);
     assert!(run.stderr.contains("invented"), "{}", run.stderr);
 }
+
+#[test]
+fn breaklines_are_followed_and_what_cannot_be_is_said() {
+    let p = place();
+    // A road in columns and rows, one that leaves the grid, and a lake's shore that does not matter.
+    p.write(
+        "roads.json",
+        r#"{"type": "FeatureCollection", "features": [
+        {"type": "Feature", "geometry": {"type": "LineString", "coordinates": [[2.2, 30.8], [25, 33], [46, 37.4]]}},
+        {"type": "Feature", "geometry": {"type": "MultiLineString", "coordinates": [[[5, 5], [5, -90]]]}},
+        {"type": "Feature", "geometry": {"type": "Point", "coordinates": [1, 1]}}]}"#,
+    );
+    for method in ["best", "greedy"] {
+        let run = p.done(&format!(
+            "terrain tin hills.raw out.obj --max-error 12 --breaklines roads.json --method {method} --verify --json {RAW}"
+        ));
+        let report = run.json();
+        assert_eq!(
+            report["breaklines"],
+            serde_json::json!({"lines": 2, "steps": 3, "beyond": 1, "bent": 0, "outside": 0, "missing": 0})
+        );
+        assert_eq!(report["verified"]["good"], true);
+        assert!(run.stderr.contains("1 geometries are no lines"), "{}", run.stderr);
+        let text = p.text("out.obj");
+        for corner in ["v 2 31 ", "v 25 33 ", "v 46 37 ", "v 5 0 "] {
+            assert!(text.lines().any(|l| l.starts_with(corner)), "{corner}");
+        }
+    }
+    // Over the lake and across each other.
+    p.write(
+        "cross.json",
+        r#"{"type": "MultiLineString", "coordinates": [[[20, 12], [47, 13]], [[3, 2], [30, 39]], [[3, 39], [31, 2]]]}"#,
+    );
+    let run = p.done(&format!(
+        "terrain tin hills.raw out.ply --max-error 12 --breaklines cross.json --verify --json {RAW}"
+    ));
+    let b = run.json()["breaklines"].clone();
+    assert!(b["bent"].as_u64() >= Some(1) && b["outside"].as_u64() >= Some(1), "{b}");
+    assert!(run.stderr.contains("led over the nearest sample"), "{}", run.stderr);
+    let fails = |what: &str, code: i32, text: &str| {
+        p.run(&format!("terrain tin hills.raw o.ply --max-error 9 {what} {RAW}")).failed(code, text);
+    };
+    p.write("bad.json", "{}");
+    fails("--breaklines bad.json", 3, "is it GeoJSON");
+    fails("--breaklines none.json", 3, "none.json");
+    fails("--breaklines roads.json --method regular", 2, "--method best or greedy");
+    fails("--breaklines roads.json --breakline-space world", 2, "--breakline-space grid");
+    fails("--breaklines roads.json --tiles 2", 2, "one network");
+    fails("--breakline-space grid", 2, "--breaklines");
+}

@@ -1073,6 +1073,8 @@ struct TerrainTin {
     isolated: usize,
     #[serde(deserialize_with = "present")]
     filled: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    breaklines: Option<TerrainBreaklines>,
     grid_triangles: usize,
     method: String,
     on_samples: bool,
@@ -1105,6 +1107,18 @@ struct TerrainError {
     max: f64,
     rms: f64,
     surface: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TerrainBreaklines {
+    lines: usize,
+    steps: usize,
+    beyond: usize,
+    bent: usize,
+    outside: usize,
+    #[serde(deserialize_with = "present")]
+    missing: Option<usize>,
 }
 
 #[derive(Deserialize)]
@@ -1236,7 +1250,14 @@ fn terrain_tin() {
     let tiled: TerrainTin = serde_json::from_str(&p.done(&tiled).stdout).unwrap();
     let tiles = tiled.tiles.unwrap();
     assert_eq!((tiles.levels.len(), tiles.border_mismatches, tiled.filled), (2, Some(0), Some(0)));
-    assert!(tin.tiles.is_none() && tin.filled.is_none() && tiles.levels[1].tiles == 4);
+    p.write("lines.json", r#"{"type": "LineString", "coordinates": [[1, 1], [9, 7]]}"#);
+    let lines: TerrainTin =
+        serde_json::from_str(&p.done(&format!("{TERRAIN} --breaklines lines.json")).stdout).unwrap();
+    let b = lines.breaklines.unwrap();
+    assert_eq!((b.lines, b.steps, b.beyond, b.bent, b.outside, b.missing), (1, 1, 0, 0, 0, Some(0)));
+    assert!(
+        tin.breaklines.is_none() && tin.tiles.is_none() && tin.filled.is_none() && tiles.levels[1].tiles == 4
+    );
 }
 
 #[derive(Deserialize)]

@@ -14,6 +14,41 @@ pub(crate) enum Line {
     Mesh(MeshLine),
     Tool(ToolLine),
     Run(Box<Row>),
+    Terrain(TerrainRow),
+}
+
+/// A tool on a height grid with an error.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct TerrainRow {
+    pub(crate) grid: String,
+    pub(crate) columns: usize,
+    pub(crate) rows: usize,
+    /// Asked for, in the grid's units.
+    pub(crate) error: f64,
+    pub(crate) tool: String,
+    pub(crate) version: String,
+    pub(crate) threads: usize,
+    /// Why there is no result.
+    pub(crate) failed: Option<String>,
+    pub(crate) triangles: usize,
+    /// Seconds of the call.
+    pub(crate) seconds: Runs,
+    /// The greatest at any sample, by the separate check.
+    pub(crate) max_error: f64,
+    /// Samples beyond the error.
+    pub(crate) beyond: usize,
+    /// Samples not covered, voids covered, triangles turned or without an area.
+    pub(crate) faults: usize,
+}
+
+impl TerrainRow {
+    /// True if the other is a run of the same thing.
+    pub(crate) fn same(&self, other: &TerrainRow) -> bool {
+        let key = |r: &TerrainRow| {
+            (r.grid.clone(), [r.columns, r.rows, r.threads], r.error.to_bits(), r.tool.clone())
+        };
+        key(self) == key(other)
+    }
 }
 
 /// A mesh that was asked for.

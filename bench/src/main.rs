@@ -18,6 +18,7 @@ mod results;
 mod run;
 mod stats;
 mod table;
+mod terrain;
 mod tools;
 mod validate;
 
@@ -40,6 +41,8 @@ struct Cli {
 enum Command {
     /// Measure, then write the tables and the report.
     Run(Run),
+    /// Measure networks of height grids, then write the tables and the report of all that was measured.
+    Terrain(Terrain),
     /// Write the tables and the report of what was measured before.
     Report(Report),
     /// Let MeshLab compute our published mean and rms again; exit code 1 if they differ.
@@ -104,6 +107,24 @@ struct Run {
 }
 
 #[derive(Args)]
+struct Terrain {
+    /// A small landscape only.
+    #[arg(long, conflicts_with = "data")]
+    quick: bool,
+    /// The height grids of this folder, instead of the generated ones.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Errors in the grids' units [default: a 50th, a 150th and a 500th of the range of each].
+    #[arg(long, value_delimiter = ',', value_name = "E")]
+    errors: Vec<f64>,
+    /// Runs of each, of which the median counts.
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    repeat: usize,
+    #[command(flatten)]
+    places: Where,
+}
+
+#[derive(Args)]
 struct Check {
     /// Only these ratios (10%).
     #[arg(long, value_delimiter = ',', value_name = "RATIOS")]
@@ -158,6 +179,20 @@ fn command(command: Command) -> Result<ExitCode> {
             run::run(&Plan::new(&wanted, &places.env)?, &places, &out, r.resume)?;
             report(&places, &out, r.publish)?;
         }
+        Command::Terrain(t) => {
+            let (places, out) = t.places.places();
+            std::fs::create_dir_all(&out.folder)?;
+            let wanted = terrain::Wanted { quick: t.quick, data: t.data, errors: t.errors, repeat: t.repeat };
+            if lines::read(&out.results())?.is_empty() {
+                lines::append(
+                    &out.results(),
+                    &lines::Line::Machine(machine::Machine::here(&places.python())),
+                )?;
+            }
+            let row = |row| lines::append(&out.results(), &lines::Line::Terrain(row));
+            terrain::run(&wanted, &places, &out.folder.join("terrain"), row)?;
+            report(&places, &out, false)?;
+        }
         Command::Report(r) => {
             let (places, out) = r.places.places();
             report(&places, &out, r.publish)?;
@@ -200,7 +235,11 @@ fn good(all: bool) -> ExitCode {
 /// Writes everything that is made of the results.
 fn report(places: &Places, out: &Out, publish: bool) -> Result<()> {
     let all = results::Results::of(lines::read(&out.results())?);
-    ensure!(!all.rows.is_empty(), "{}: nothing was measured", out.results().display());
+    ensure!(
+        !(all.rows.is_empty() && all.terrain.is_empty()),
+        "{}: nothing was measured",
+        out.results().display()
+    );
     put(&out.folder.join("table.md"), &table::markdown(&all))?;
     put(&out.folder.join("report.html"), &page::html(&all, &heats::heats(&all, out)?))?;
     if publish {

@@ -1,6 +1,6 @@
 //! What was measured, sorted for reading.
 
-use crate::lines::{Line, MeshLine, Row, ToolLine};
+use crate::lines::{Line, MeshLine, Row, TerrainRow, ToolLine};
 use crate::machine::Machine;
 use crate::stats::Standing;
 use crate::tools::{self, Tool};
@@ -12,6 +12,7 @@ pub(crate) struct Results {
     pub(crate) meshes: Vec<MeshLine>,
     pub(crate) tools: Vec<ToolLine>,
     pub(crate) rows: Vec<Row>,
+    pub(crate) terrain: Vec<TerrainRow>,
 }
 
 /// A comparison of one of our rows with a peer's at the same target.
@@ -33,6 +34,10 @@ impl Results {
                 Line::Machine(m) => all.machine = m,
                 Line::Mesh(m) => all.meshes.push(m),
                 Line::Tool(t) => all.tools.push(t),
+                Line::Terrain(t) => {
+                    all.terrain.retain(|old| !old.same(&t));
+                    all.terrain.push(t);
+                }
                 Line::Run(r) => {
                     all.rows.retain(|old| !old.same(&r));
                     all.rows.push(*r);

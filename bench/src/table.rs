@@ -1,6 +1,6 @@
 //! The results in Markdown.
 
-use crate::lines::{MeshLine, ROUNDING, Row};
+use crate::lines::{MeshLine, ROUNDING, Row, TerrainRow};
 use crate::measures::Measures;
 use crate::results::{Duel, Results, label, name};
 use crate::stats::{Standing, front};
@@ -47,6 +47,51 @@ pub(crate) fn markdown(all: &Results) -> String {
     }
     out += "\n## Where we lose\n\n";
     out += &losses(all);
+    out += &terrain(all);
+    out
+}
+
+/// Networks of height grids; nothing where none were measured.
+fn terrain(all: &Results) -> String {
+    if all.terrain.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from(
+        "\n## Terrain\n\nTriangles for the same greatest error at the samples, each network checked at every sample by separate code: `true error` is what \
+         that found, `beyond` how many samples it found farther than asked. Shares are of Delatin's triangles. Seconds: the call alone.\n",
+    );
+    let mut seen: Vec<(&str, f64)> = vec![];
+    for row in &all.terrain {
+        if seen.contains(&(&row.grid, row.error)) {
+            continue;
+        }
+        seen.push((&row.grid, row.error));
+        let group: Vec<&TerrainRow> =
+            all.terrain.iter().filter(|r| r.grid == row.grid && r.error == row.error).collect();
+        let reference = group.iter().find(|r| r.tool == crate::terrain::REFERENCE && r.failed.is_none());
+        let size = format!("{} x {}", thousands(row.columns), thousands(row.rows));
+        let _ = write!(out, "\n### {}, {size}, error {}\n\n", row.grid, figures(row.error));
+        let cells = group.iter().map(|r| {
+            let name = crate::terrain::TOOLS.iter().find(|t| t.id == r.tool).map_or(&*r.tool, |t| t.name);
+            let threads = if r.threads == 1 { String::new() } else { format!(", {} threads", r.threads) };
+            let label = format!("{name}{threads}");
+            if let Some(why) = &r.failed {
+                return vec![label, format!("not measured: {why}")];
+            }
+            let share =
+                reference.map_or("-".into(), |d| format!("{:.2}", r.triangles as f64 / d.triangles as f64));
+            vec![
+                label,
+                thousands(r.triangles),
+                share,
+                figures(r.max_error),
+                thousands(r.beyond),
+                thousands(r.faults),
+                seconds(r.seconds.median),
+            ]
+        });
+        out += &table(&["tool", "triangles", "share", "true error", "beyond", "faults", "seconds"], cells);
+    }
     out
 }
 

@@ -7,6 +7,7 @@ pub mod camera;
 #[cfg(feature = "files")]
 pub mod files;
 pub(crate) mod flatten;
+pub mod geojson;
 pub mod gltf;
 pub mod grid;
 pub(crate) mod notes;

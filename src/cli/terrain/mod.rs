@@ -1,5 +1,6 @@
 //! `progmesh terrain`: height grids.
 
+mod breaklines;
 mod build;
 mod dress;
 mod info;

@@ -1,5 +1,6 @@
 //! `progmesh terrain tin GRID OUT`.
 
+use super::breaklines::{BreaklineArgs, Breaklines};
 use super::dress::DressArgs;
 use super::input::{GridInput, known_spacing, whole};
 use super::tiles::{self, Job, TileFormat};
@@ -32,6 +33,7 @@ Examples:
   progmesh terrain tin alps.tif alps.obj --triangles 50000 --json
   progmesh terrain tin alps.tif alps.ply --max-error 5 --method greedy --verify
   progmesh terrain tin alps.tif alps.glb --max-error 5 --texture orthophoto.jpg
+  progmesh terrain tin alps.tif alps.ply --max-error 5 --fill --breaklines roads.geojson
   progmesh terrain tin alps.tif tiles --max-error 5 --tiles 8
   progmesh terrain tin alps.tif terrain --max-error 5 --tiles 8 --tile-format quantized-mesh
   progmesh terrain tin dem.raw dem.stl --size 1025x1025 --type u16 --max-error 3 --on-samples
@@ -77,6 +79,9 @@ pub(crate) struct Args {
     /// Fill voids that do not reach the border of the grid from their rims, as a membrane stretched over them: invented heights
     #[arg(long, help_heading = "Voids")]
     fill: bool,
+
+    #[command(flatten)]
+    breaklines: BreaklineArgs,
 
     /// Write a directory OUT of N x N tiles, whose borders are the same from both sides to the bit, and of all levels above, each with a
     /// quarter of the tiles and twice the error
@@ -209,6 +214,12 @@ impl Args {
     fn one(&self, start: Instant, interrupt: &Interrupt, warnings: &mut Warnings) -> Result<Report, Failure> {
         let format = self.output.format(warnings)?;
         let mut drawing = self.picture.drawing()?;
+        let known = matches!(self.method, MethodName::Best | MethodName::Greedy);
+        if self.breaklines.are_given() && (!known || self.error == ContractName::Surface) {
+            return Err(Failure::Usage(
+                "--breaklines goes with --method best or greedy and --error samples".into(),
+            ));
+        }
         let file = self.input.name();
         common::in_pool(self.threads, || {
             let source = self.input.open(warnings)?;
@@ -219,9 +230,11 @@ impl Args {
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
             let making = Instant::now();
+            let (lines, mut breaklines) = self.breaklines.steps(&source, warnings)?;
+            let options = self.options().with_breaklines(lines);
             let progress = Progress::new(interrupt, self.quiet, "triangulating");
-            let made = tin::triangulate(&grid, &self.options(), &Watch(&progress))
-                .map_err(|e| failure(&file, &e))?;
+            let made =
+                tin::triangulate(&grid, &options, &Watch(&progress)).map_err(|e| failure(&file, &e))?;
             drop(progress);
             let make = making.elapsed().as_secs_f64();
             warnings.say(isolated_samples(made.isolated).map(|w| format!("{file}: {w}")));
@@ -229,6 +242,11 @@ impl Args {
             let verdict = self.verify.then(|| {
                 tin::verify(&grid, &made.tin, self.max_error.unwrap_or(f64::INFINITY), self.error.contract())
             });
+            if let Some(b) = &mut breaklines {
+                (b.bent, b.outside) = (made.bent, made.outside);
+                b.missing = self.verify.then(|| tin::lines_missing(&made.tin, &options.breaklines));
+                warnings.say(bent(b).map(|w| format!("{file}: {w}")));
+            }
             let verify = verifying.elapsed().as_secs_f64();
             if interrupt.is_set() {
                 return Err(Failure::Interrupted);
@@ -249,7 +267,7 @@ impl Args {
             let total = start.elapsed().as_secs_f64();
             let seconds = Seconds { read, make, verify, write, draw, total };
             let report = self.report(&file, &grid, space, &made, verdict.as_ref(), seconds);
-            Ok(Report { filled, ..report })
+            Ok(Report { filled, breaklines, ..report })
         })
     }
 
@@ -275,6 +293,9 @@ impl Args {
                 "--tiles goes with --method best or greedy and --error samples: borders of tiles know their own samples only"
                     .into(),
             ));
+        }
+        if self.breaklines.are_given() {
+            return Err(Failure::Usage("--breaklines goes into one network: leave out --tiles".into()));
         }
         if self.tile_format == TileFormat::QuantizedMesh && (self.spacing.is_some() || self.dress.drapes()) {
             return Err(Failure::Usage(
@@ -415,6 +436,7 @@ impl Args {
             verified: verdict.map(|v| Verified::of(v, self.error.contract())),
             tiles: None,
             filled: None,
+            breaklines: None,
             space,
             spacing,
             exaggeration,
@@ -426,7 +448,8 @@ impl Args {
     /// Whether all that was asked for was done.
     fn judge(&self, report: &Report) -> Result<(), Failure> {
         let apart = report.tiles.as_ref().and_then(|t| t.border_mismatches).is_some_and(|n| n > 0);
-        if apart || report.verified.as_ref().is_some_and(|v| !v.good) {
+        let astray = report.breaklines.as_ref().is_some_and(|b| b.missing > Some(b.bent + b.outside));
+        if apart || astray || report.verified.as_ref().is_some_and(|v| !v.good) {
             return Err(Failure::Missed(format!("{}: the check found a fault; this is a bug", report.file)));
         }
         match self.triangles {
@@ -453,6 +476,16 @@ fn picture_space(source: &GridFile, grid: &Grid, space: Space) -> Space {
     let range = grid.range().map_or(0.0, |(least, greatest)| greatest - least);
     let exaggeration = if range > 0.0 { (PICTURE_RELIEF * side / range).max(f64::MIN_POSITIVE) } else { 1.0 };
     Space::World { spacing: [1.0, 1.0], exaggeration }
+}
+
+fn bent(b: &Breaklines) -> Option<String> {
+    (b.bent + b.outside > 0).then(|| {
+        format!(
+            "breaklines: {} pieces were led over the nearest sample where lines cross or voids begin, {} left out where nothing is valid",
+            thousands(b.bent),
+            thousands(b.outside)
+        )
+    })
 }
 
 fn isolated_samples(count: usize) -> Option<String> {

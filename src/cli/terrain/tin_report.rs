@@ -1,5 +1,6 @@
 //! What `--json` and the summary of `terrain tin` say.
 
+use super::breaklines::Breaklines;
 use super::tile_report::Tiles;
 use crate::cli::common::{short, thousands};
 use progmesh::terrain::tin::{Contract, Verdict};
@@ -15,6 +16,7 @@ pub(super) struct Report {
     pub valid: usize,
     pub isolated: usize,
     pub filled: Option<usize>,
+    pub breaklines: Option<Breaklines>,
     pub grid_triangles: usize,
     pub method: &'static str,
     pub on_samples: bool,

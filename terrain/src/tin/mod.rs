@@ -46,4 +46,4 @@ pub use borders::Borders;
 pub use make::triangulate;
 pub use options::{Contract, Control, Errors, Made, Method, Options, Quiet, Tin, TinError};
 pub use tiles::{Cuts, Level, Tiling};
-pub use verify::{Verdict, verify};
+pub use verify::{Verdict, lines_missing, verify};

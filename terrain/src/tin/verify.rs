@@ -3,6 +3,7 @@
 
 use super::{Contract, Tin};
 use crate::Grid;
+use std::collections::BTreeMap;
 
 /// What a network does to a grid's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -262,6 +263,43 @@ fn pieces(grid: &Grid, tin: &Tin, t: [u32; 3], fixed: Option<&Fixed>, error: f64
     }
 }
 
+/// How many of these straight lines between samples are not followed by sides of triangles from end to end. Looks at the triangles alone.
+/// O(triangles log triangles + sides along the lines).
+#[must_use]
+pub fn lines_missing(tin: &Tin, lines: &[[[u32; 2]; 2]]) -> usize {
+    let mut neighbours: BTreeMap<[u32; 2], Vec<[u32; 2]>> = BTreeMap::new();
+    for t in &tin.triangles {
+        for i in 0..3 {
+            let ends = (tin.points.get(t[i] as usize), tin.points.get(t[(i + 1) % 3] as usize));
+            if let (Some(&a), Some(&b)) = ends {
+                neighbours.entry(a).or_default().push(b);
+                neighbours.entry(b).or_default().push(a);
+            }
+        }
+    }
+    let follows = |&[a, b]: &[[u32; 2]; 2]| {
+        let [dx, dy] = [0, 1].map(|k| i64::from(b[k]) - i64::from(a[k]));
+        let mut at = a;
+        while at != b {
+            let ahead = |p: &&[u32; 2]| {
+                let [x, y] = [0, 1].map(|k| i64::from(p[k]) - i64::from(at[k]));
+                x * dy == y * dx && x * dx + y * dy > 0
+            };
+            match neighbours.get(&at).and_then(|n| n.iter().find(ahead)) {
+                Some(&next) => at = next,
+                None => return false,
+            }
+            // Past the end.
+            let [x, y] = [0, 1].map(|k| i64::from(b[k]) - i64::from(at[k]));
+            if x * dx + y * dy < 0 {
+                return false;
+            }
+        }
+        true
+    };
+    lines.iter().filter(|line| !follows(line)).count()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -298,6 +336,14 @@ mod tests {
         let verdict = verify(&grid, &tin, 1.9, Contract::Surface);
         assert_eq!((verdict.surface_error, verdict.pieces_beyond), (2.0, 2));
         assert!(verify(&grid, &tin, 2.0, Contract::Surface).is_good());
+    }
+
+    #[test]
+    fn lines_without_sides_are_counted() {
+        let (_, tin) = flat_square();
+        let lines =
+            [[[0, 0], [2, 2]], [[2, 2], [0, 0]], [[0, 2], [2, 0]], [[0, 0], [1, 1]], [[0, 0], [2, 0]]];
+        assert_eq!(lines_missing(&tin, &lines), 2);
     }
 
     #[test]

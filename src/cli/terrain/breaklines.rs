@@ -1,0 +1,155 @@
+//! `--breaklines`: lines of GeoJSON as steps from sample to sample.
+
+use crate::cli::Failure;
+use crate::cli::common::{Warnings, thousands};
+use clap::ValueEnum;
+use progmesh::io::grid::GridFile;
+use progmesh::io::{files, geojson};
+use serde::Serialize;
+use std::path::PathBuf;
+
+#[derive(clap::Args, Debug)]
+pub(crate) struct BreaklineArgs {
+    /// Lines that sides of triangles shall follow, from sample to sample: LineString and MultiLineString of a GeoJSON file
+    #[arg(long, value_name = "FILE", help_heading = "Breaklines")]
+    breaklines: Option<PathBuf>,
+    /// What their coordinates are [default: world if the grid says where it lies, grid otherwise]
+    #[arg(long, value_enum, value_name = "SPACE", requires = "breaklines", help_heading = "Breaklines")]
+    breakline_space: Option<LineSpace>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum LineSpace {
+    /// Those of the grid's own coordinate system
+    World,
+    /// Columns and rows
+    Grid,
+}
+
+/// What `--json` says of them; docs/json.md says what each field means.
+#[derive(Clone, Debug, Default, Serialize)]
+pub(super) struct Breaklines {
+    pub lines: usize,
+    pub steps: usize,
+    pub beyond: usize,
+    pub bent: usize,
+    pub outside: usize,
+    pub missing: Option<usize>,
+}
+
+impl BreaklineArgs {
+    pub(super) fn are_given(&self) -> bool {
+        self.breaklines.is_some()
+    }
+
+    /// Straight steps between samples, and what is known of them so far.
+    pub(super) fn steps(
+        &self,
+        source: &GridFile,
+        warnings: &mut Warnings,
+    ) -> Result<(Vec<[[u32; 2]; 2]>, Option<Breaklines>), Failure> {
+        let Some(path) = &self.breaklines else { return Ok((vec![], None)) };
+        let failed = |what: String| Failure::Input(format!("{}: {what}", path.display()));
+        let bytes = files::read_all(path).map_err(|e| failed(e.to_string()))?;
+        let read = geojson::decode_lines(&bytes).map_err(|e| failed(e.to_string()))?;
+        warnings.say((read.others > 0).then(|| {
+            format!(
+                "{}: {} geometries are no lines and were left out",
+                path.display(),
+                thousands(read.others)
+            )
+        }));
+        let transform = match (self.breakline_space, source.georeference.transform) {
+            (Some(LineSpace::Grid), _) | (None, None) => None,
+            (_, Some(transform)) => Some(transform),
+            (Some(LineSpace::World), None) => {
+                return Err(Failure::Usage(
+                    "the grid does not say where it lies: --breakline-space grid takes columns and rows"
+                        .into(),
+                ));
+            }
+        };
+        let most = [source.raster.columns(), source.raster.rows()].map(|n| n.saturating_sub(1) as f64);
+        let mut facts = Breaklines { lines: read.lines.len(), ..Breaklines::default() };
+        let mut steps = vec![];
+        for line in &read.lines {
+            let place = |&p: &[f64; 2]| transform.map_or(Some(p), |t| t.invert(p));
+            let points: Option<Vec<[f64; 2]>> = line.iter().map(place).collect();
+            let points = points.ok_or_else(|| failed("the grid's transform has no inverse".into()))?;
+            for pair in points.windows(2) {
+                let Some(clipped) = clip([pair[0], pair[1]], most) else {
+                    facts.beyond += 1;
+                    continue;
+                };
+                facts.beyond += usize::from(clipped != [pair[0], pair[1]]);
+                let [a, b] = clipped.map(|p| p.map(|c| c.round() as u32));
+                if a != b {
+                    steps.push([a, b]);
+                }
+            }
+        }
+        facts.steps = steps.len();
+        warnings.say((facts.beyond > 0).then(|| {
+            format!(
+                "{}: {} pieces reach beyond the grid and were cut there",
+                path.display(),
+                thousands(facts.beyond)
+            )
+        }));
+        Ok((steps, Some(facts)))
+    }
+}
+
+/// The part of a straight line within 0 to `most` (Liang & Barsky 1984).
+fn clip([a, b]: [[f64; 2]; 2], most: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+    let (mut from, mut to) = (0.0f64, 1.0f64);
+    for k in 0..2 {
+        let d = b[k] - a[k];
+        for (step, room) in [(-d, a[k]), (d, most[k] - a[k])] {
+            if step == 0.0 {
+                if room < 0.0 {
+                    return None;
+                }
+            } else if step < 0.0 {
+                from = from.max(room / step);
+            } else {
+                to = to.min(room / step);
+            }
+        }
+    }
+    // Not for coordinates beyond all numbers either.
+    if !(from <= to) {
+        return None;
+    }
+    let at = |t: f64| -> [f64; 2] {
+        let p = |k: usize| {
+            if t == 0.0 {
+                a[k]
+            } else if t == 1.0 {
+                b[k]
+            } else {
+                a[k] + t * (b[k] - a[k])
+            }
+        };
+        std::array::from_fn(|k| p(k).clamp(0.0, most[k]))
+    };
+    Some([at(from), at(to)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::clip;
+
+    #[test]
+    fn lines_are_cut_at_the_grid() {
+        let most = [10.0, 5.0];
+        assert_eq!(clip([[1.0, 1.0], [9.0, 4.0]], most), Some([[1.0, 1.0], [9.0, 4.0]]));
+        assert_eq!(clip([[-5.0, 2.0], [5.0, 2.0]], most), Some([[0.0, 2.0], [5.0, 2.0]]));
+        assert_eq!(clip([[-5.0, 2.0], [25.0, 2.0]], most), Some([[0.0, 2.0], [10.0, 2.0]]));
+        assert_eq!(clip([[-5.0, -2.0], [25.0, -2.0]], most), None);
+        assert_eq!(clip([[11.0, 0.0], [11.0, 5.0]], most), None);
+        assert_eq!(clip([[3.0, 3.0], [3.0, 3.0]], most), Some([[3.0, 3.0], [3.0, 3.0]]));
+        let far = clip([[1e308, 0.0], [-1e308, 0.0]], most).unwrap();
+        assert!(far.iter().all(|p| (0.0..=10.0).contains(&p[0]) && p[1] == 0.0));
+    }
+}
