@@ -85,6 +85,18 @@ impl Globe {
         (self.east * x + self.up * y - self.north * z).as_vec3().to_array()
     }
 
+    /// The longer of the steps by a column and by a row, in metres, about where they are longest.
+    pub fn step(&self) -> f64 {
+        let t = self.transform.0;
+        // A degree of the equator is longer than any other.
+        t[0].hypot(t[3]).max(t[1].hypot(t[4])) * MAJOR.to_radians()
+    }
+
+    /// The length of sides that lie so far below the ellipsoid at most.
+    pub fn longest(sag: f64) -> f64 {
+        (8.0 * MAJOR * (1.0 - ECCENTRICITY_2) * sag.max(0.0)).sqrt()
+    }
+
     /// By how much flat sides of this length in metres lie below the ellipsoid at most.
     pub fn sag(length: f64) -> f64 {
         // The least radius of curvature, that along the meridian at the equator.
@@ -124,5 +136,7 @@ mod tests {
         assert!((n[1] - 1.0).abs() < 1e-6, "{n:?}");
         assert!(globe.place([1.0, 0.0], 0.0)[2] < -1000.0);
         assert!((Globe::sag(10_000.0) - 1.97).abs() < 0.01);
+        assert!((Globe::longest(Globe::sag(10_000.0)) - 10_000.0).abs() < 1e-6);
+        assert!((globe.step() - 1113.0).abs() < 1.0);
     }
 }

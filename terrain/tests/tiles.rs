@@ -152,6 +152,22 @@ fn a_border_follows_from_its_samples_alone() {
 }
 
 #[test]
+fn vertices_can_be_spread_evenly() {
+    let grid = Grid::new(65, 65, vec![3.0; 65 * 65]).unwrap();
+    let tiling = Tiling::new(&grid, &Options::default(), 1.0).unwrap();
+    let cuts = Cuts::even(65, 65, 2);
+    assert_eq!(check(&grid, &tiling.level(cuts.clone(), 1.0).unwrap(), 1.0), 8);
+    let spread = tiling.level_with(cuts, 1.0, 8).unwrap();
+    assert_eq!(check(&grid, &spread, 1.0), 2 * 64, "cells of 8 x 8");
+    let tin = spread.tile([1, 1], &Quiet).unwrap().unwrap().tin;
+    let side = |a: u32, b: u32| {
+        let [p, q] = [a, b].map(|v| tin.points[v as usize]);
+        p[0].abs_diff(q[0]).max(p[1].abs_diff(q[1]))
+    };
+    assert!(tin.triangles.iter().all(|&[a, b, c]| side(a, b).max(side(b, c)).max(side(c, a)) <= 8));
+}
+
+#[test]
 fn cuts_are_even_and_halve_down_to_one_tile() {
     let mut cuts = Cuts::even(101, 7, 8);
     assert_eq!(cuts.columns, [0, 12, 25, 37, 50, 62, 75, 87, 100]);

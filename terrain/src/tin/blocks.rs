@@ -116,7 +116,8 @@ impl Network {
         let vertex = |(i, &v): (usize, &u32)| {
             let at = self.vertices[v as usize];
             let locked = inside[i] != uses[v as usize] || rules.border_stays && on_border(at);
-            Vertex { at, triangle: NONE, locked, kept: stays[v as usize] }
+            let spread = rules.spread.is_some_and(|s| s.has_column(at.x) && s.has_row(at.y));
+            Vertex { at, triangle: NONE, locked, kept: stays[v as usize] || spread }
         };
         let vertices = block.vertices.iter().enumerate().map(vertex).collect();
         let mut patch = Patch::new(field, rules, vertices, block.triangles.clone());

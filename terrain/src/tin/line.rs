@@ -2,15 +2,16 @@
 
 use super::field::Tolerance;
 
-/// A piece is at most this many samples long: the work is at most this many steps a sample.
-const LONGEST: usize = 4096;
+/// A piece is never longer than this many steps: so much work a sample is the most.
+pub(super) const LONGEST: usize = 4096;
 
 /// The samples that stay of a run without voids: both ends, and the fewest between them with which every sample lies within the tolerance of
-/// the straight pieces; pieces are at most 4,096 steps long. Whether a piece may be is decided in integers.
+/// the straight pieces; pieces are at most `longest` steps long, and 4,096. Whether a piece may be is decided in integers.
 ///
 /// The fewest pieces are a shortest path (Imai & Iri 1988); which pieces may start at a sample follows from the range of slopes that the
 /// samples passed leave. O(samples x the length of pieces).
-pub(super) fn simplify(heights: &[i32], tolerance: Tolerance) -> Vec<usize> {
+pub(super) fn simplify(heights: &[i32], tolerance: Tolerance, longest: usize) -> Vec<usize> {
+    let longest = longest.clamp(1, LONGEST);
     let n = heights.len();
     if n < 3 {
         return (0..n).collect();
@@ -22,7 +23,7 @@ pub(super) fn simplify(heights: &[i32], tolerance: Tolerance) -> Vec<usize> {
         let pieces = before[i].0 + 1;
         // Slopes between these two fractions pass all samples up to j; in fractions of a quantum a step.
         let (mut low, mut high): (Option<(i64, i64)>, Option<(i64, i64)>) = (None, None);
-        for j in i + 1..n.min(i + 1 + LONGEST) {
+        for j in i + 1..n.min(i + 1 + longest) {
             let steps = (j - i) as i64;
             let rise = one * (i64::from(heights[j]) - i64::from(heights[i]));
             let above = low.is_none_or(|(r, s)| rise * s >= r * steps);
@@ -68,12 +69,13 @@ mod tests {
 
     #[test]
     fn a_straight_line_is_one_piece_and_a_roof_two() {
-        let (_, none) = tolerance(0.0);
-        assert_eq!(simplify(&[0, 3, 6, 9, 12], none), [0, 4]);
-        assert_eq!(simplify(&[0, 3, 6, 3, 0], none), [0, 2, 4]);
-        assert_eq!(simplify(&[5], none), [0]);
-        assert_eq!(simplify(&[], none), [0; 0]);
-        assert_eq!(simplify(&[0; 9000], none).len(), 4, "pieces of 4,096");
+        let (_, none, LONGEST) = tolerance(0.0);
+        assert_eq!(simplify(&[0, 3, 6, 9, 12], none, LONGEST), [0, 4]);
+        assert_eq!(simplify(&[0, 3, 6, 3, 0], none, LONGEST), [0, 2, 4]);
+        assert_eq!(simplify(&[5], none, LONGEST), [0]);
+        assert_eq!(simplify(&[], none, LONGEST), [0; 0]);
+        assert_eq!(simplify(&[0; 9000], none, LONGEST).len(), 4, "pieces of 4,096");
+        assert_eq!(simplify(&[0; 8], none, 3).len(), 4);
     }
 
     proptest! {
@@ -96,7 +98,7 @@ mod tests {
                     (on - f64::from(heights[k])).abs() <= f64::from(error) + 1e-9
                 })
             });
-            let kept = simplify(&h, tolerance);
+            let kept = simplify(&h, tolerance, LONGEST);
             prop_assert!(good(&kept) && kept[0] == 0 && kept[kept.len() - 1] == h.len() - 1);
             let inner = h.len() - 2;
             let least = (0..1u32 << inner).filter_map(|mask| {

@@ -170,7 +170,7 @@ impl Work<'_> {
     fn make(&self, options: &Options, tolerance: Tolerance) -> Option<(Network, Option<usize>)> {
         let surface = options.contract == Contract::Surface;
         let free_heights = options.method == Method::Best && !options.on_samples;
-        let rules = Rules { tolerance, surface, free_heights, border_stays: false };
+        let rules = Rules { tolerance, surface, free_heights, border_stays: false, spread: None };
         let goal = Goal { tolerance, surface, triangles: options.triangles.unwrap_or(usize::MAX) };
         let network = match options.method {
             Method::Regular => {

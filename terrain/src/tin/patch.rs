@@ -45,6 +45,26 @@ pub(super) struct Rules {
     pub free_heights: bool,
     /// Whether vertices on the border of the rectangle stay as they are: another network has them too.
     pub border_stays: bool,
+    /// Vertices that stay, evenly spread.
+    pub spread: Option<Spread>,
+}
+
+/// Samples whose column and row in the whole grid are multiples of a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spread {
+    pub step: usize,
+    /// Column and row of the first sample in the whole grid.
+    pub first: [usize; 2],
+}
+
+impl Spread {
+    pub(super) fn has_column(&self, x: i32) -> bool {
+        (self.first[0] + x as usize).is_multiple_of(self.step)
+    }
+
+    pub(super) fn has_row(&self, y: i32) -> bool {
+        (self.first[1] + y as usize).is_multiple_of(self.step)
+    }
 }
 
 /// The triangles around a vertex, to the left.

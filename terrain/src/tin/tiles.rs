@@ -10,7 +10,7 @@ use super::line;
 use super::make::{better, too_fine};
 use super::network::Network;
 use super::options::{Contract, Control, Made, Method, Options, TinError};
-use super::patch::Rules;
+use super::patch::{Rules, Spread};
 use super::region::Region;
 use crate::{Grid, Window};
 
@@ -124,6 +124,15 @@ impl<'a> Tiling<'a> {
     /// # Errors
     /// [`TinError`]; [`TinError::BadCuts`] for cuts that do not fit the grid.
     pub fn level(&self, cuts: Cuts, error: f64) -> Result<Level<'_>, TinError> {
+        self.level_with(cuts, error, line::LONGEST)
+    }
+
+    /// The same with a vertex at every sample whose column and row are multiples of `spread`, and on borders no farther than that apart: for grids
+    /// that do not lie on a plane, where a flat triangle must not be too large.
+    ///
+    /// # Errors
+    /// As [`Tiling::level`].
+    pub fn level_with(&self, cuts: Cuts, error: f64, spread: usize) -> Result<Level<'_>, TinError> {
         if !(error >= 0.0 && error.is_finite()) {
             return Err(TinError::BadError);
         }
@@ -138,14 +147,14 @@ impl<'a> Tiling<'a> {
                      beside: &dyn Fn(i32, i32) -> [bool; 2]| {
             let line = |&c: &usize| {
                 let c = c as i32;
-                border(ends, tolerance, &|k| at(c, k), &|k| beside(c, k))
+                border(ends, tolerance, spread, &|k| at(c, k), &|k| beside(c, k))
             };
             cuts.iter().map(line).collect::<Vec<_>>()
         };
         let columns =
             along(&cuts.columns, &cuts.rows, &|x, y| field.at(x, y), &|x, y| region.beside_column(x, y));
         let rows = along(&cuts.rows, &cuts.columns, &|y, x| field.at(x, y), &|y, x| region.beside_row(x, y));
-        Ok(Level { tiling: self, cuts, tolerance, columns, rows })
+        Ok(Level { tiling: self, cuts, tolerance, spread: spread.clamp(1, 1 << 20), columns, rows })
     }
 }
 
@@ -153,6 +162,7 @@ impl<'a> Tiling<'a> {
 fn border(
     ends: &[usize],
     tolerance: Tolerance,
+    spread: usize,
     at: &dyn Fn(i32) -> i32,
     beside: &dyn Fn(i32) -> [bool; 2],
 ) -> Vec<i32> {
@@ -165,7 +175,8 @@ fn border(
             let to = (from + 1..last).find(|&k| beside(k) != kind).unwrap_or(last);
             if kind != [false, false] {
                 let heights: Vec<i32> = (from..=to).map(at).collect();
-                vertices.extend(line::simplify(&heights, tolerance).into_iter().map(|k| from + k as i32));
+                vertices
+                    .extend(line::simplify(&heights, tolerance, spread).into_iter().map(|k| from + k as i32));
             }
             from = to;
         }
@@ -180,6 +191,7 @@ pub struct Level<'a> {
     tiling: &'a Tiling<'a>,
     cuts: Cuts,
     tolerance: Tolerance,
+    spread: usize,
     /// Rows of the vertices on each cut by a column.
     columns: Vec<Vec<i32>>,
     /// Columns of those on each cut by a row.
@@ -223,6 +235,12 @@ impl Level<'_> {
             within(&self.rows[cut], x0, x1).into_iter().for_each(|x| _ = mesh.insert((x, y)));
         }
         region.constrain(&mut mesh);
+        let spread = Spread { step: self.spread, first: [x0, y0] };
+        for y in (1..field.rows - 1).filter(|&y| spread.has_row(y)) {
+            for x in (1..field.columns - 1).filter(|&x| spread.has_column(x)) {
+                mesh.insert((x, y));
+            }
+        }
         // Samples on borders are within the tolerance of them already, so that none becomes a vertex.
         let goal = Goal { tolerance: self.tolerance, surface: false, triangles: usize::MAX };
         refine(&field, &mut mesh, goal, control).ok_or(TinError::Cancelled)?;
@@ -234,6 +252,7 @@ impl Level<'_> {
                 surface: false,
                 free_heights: !options.on_samples,
                 border_stays: true,
+                spread: Some(spread),
             };
             better(&mut network, &field, rules, control).ok_or(TinError::Cancelled)?;
         }
