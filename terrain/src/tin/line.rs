@@ -22,7 +22,7 @@ pub(super) fn simplify(heights: &[i32], tolerance: Tolerance, longest: usize) ->
     for i in 0..n - 1 {
         let pieces = before[i].0 + 1;
         // Slopes between these two fractions pass all samples up to j; in fractions of a quantum a step.
-        let (mut low, mut high): (Option<(i64, i64)>, Option<(i64, i64)>) = (None, None);
+        let [mut low, mut high]: [Option<(i64, i64)>; 2] = [None; 2];
         for j in i + 1..n.min(i + 1 + longest) {
             let steps = (j - i) as i64;
             let rise = one * (i64::from(heights[j]) - i64::from(heights[i]));
@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn a_straight_line_is_one_piece_and_a_roof_two() {
-        let (_, none, LONGEST) = tolerance(0.0);
+        let (_, none) = tolerance(0.0);
         assert_eq!(simplify(&[0, 3, 6, 9, 12], none, LONGEST), [0, 4]);
         assert_eq!(simplify(&[0, 3, 6, 3, 0], none, LONGEST), [0, 2, 4]);
         assert_eq!(simplify(&[5], none, LONGEST), [0]);
