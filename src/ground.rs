@@ -7,8 +7,8 @@ use crate::aif::{MeshInput, Positions};
 use crate::scene::{Image, Material, Scene, SceneMesh};
 use crate::terrain::tin::Tin;
 use crate::terrain::{Grid, SampleAt};
-pub use globe::{Globe, earth_centred};
 use glam::{DMat4, DVec4};
+pub use globe::{Globe, earth_centred};
 
 /// Where vertices stand.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -72,7 +72,7 @@ pub fn encode(tile: &Tile) -> Vec<u8> {
     }
     let mut out = header(tile, &order);
     out.extend((order.len() as u32).to_le_bytes());
-    for k in 0..3 {
+    for k in [0, 1, 2] {
         let mut last = 0i32;
         for &v in &order {
             let now = i32::from(rounded[v as usize][k]);

@@ -201,7 +201,7 @@ mod tests {
         let mut job = Job::default();
         job.options.placement = Some(Placement::Endpoint);
         job.options.lock_border = true;
-        let scene = ground::scene(&made.tin, grid, space, "hills");
+        let scene = ground::scene(&made.tin, grid, space, &ground::Dress::default(), "hills");
         let built = build_progressive(scene, &job, &crate::simplify::Quiet).unwrap();
         SelectiveScene::new(built.scene, &Options::default()).unwrap()
     }

@@ -48,14 +48,14 @@ impl Lap {
 }
 
 impl<'a> Ground<'a> {
-    /// The grid as a mesh in `space` has it. `None` for a space that flattens it, and a grid without heights.
+    /// The grid as a mesh in `space` has it. `None` for a space that flattens it, for the globe, and for a grid without heights.
     pub fn new(grid: &'a Grid, space: Space) -> Option<Ground<'a>> {
-        let to_world = space.matrix(grid);
+        let to_world = space.matrix(grid)?;
         let to_grid = to_world.inverse();
         let finite = to_world.is_finite() && to_grid.is_finite();
         let up = match space {
             Space::Grid => DVec3::Z,
-            Space::World { .. } => DVec3::Y,
+            Space::World { .. } | Space::Globe(_) => DVec3::Y,
         };
         let spacing = to_world.x_axis.truncate().length();
         let (least, _) = grid.range().filter(|_| finite && spacing > 0.0)?;

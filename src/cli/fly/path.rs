@@ -176,7 +176,7 @@ impl PathArgs {
         let spacing = self.spacing.or(known).unwrap_or([1.0, 1.0]);
         let world = Space::World { spacing, exaggeration: self.exaggeration.unwrap_or(1.0) };
         let fits = |space: &Space| {
-            let back: DMat4 = space.matrix(grid).inverse();
+            let Some(back) = space.matrix(grid).map(|m: DMat4| m.inverse()) else { return false };
             let (a, b) = (back.transform_point3(lo), back.transform_point3(hi));
             let within = |a: f64, b: f64, n: usize| {
                 let last = n.saturating_sub(1) as f64;
