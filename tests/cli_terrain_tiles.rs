@@ -375,8 +375,8 @@ fn quantized_mesh_tiles_lie_on_the_globe_and_meet_bit_by_bit() {
                 }
                 each_sample(corner, |c, r, h| {
                     let inside = c < SIDE && r < SIDE;
-                    // The lattice is not the samples: the grid bends by up to 7 from one to the next.
-                    assert!(!inside || (h - height(c, r)).abs() <= allowed + 8.0, "level {z}: {c} {r}: {h}");
+                    // The lattice is not the samples: the grid bends by up to 7 from one to the next, twice.
+                    assert!(!inside || (h - height(c, r)).abs() <= allowed + 12.0, "level {z}: {c} {r}: {h}");
                 });
             }
             for n in &tile.normals {
