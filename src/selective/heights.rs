@@ -115,8 +115,9 @@ fn height_at([a, b, c]: &[DVec3; 3], x: f64, y: f64) -> Option<f64> {
     let longest =
         (*a - *b).truncate().length().max((*b - *c).truncate().length()).max((*c - *a).truncate().length());
     let least = -1e-9 * longest * longest / all.abs();
-    (all != 0.0 && parts.iter().all(|&w| w >= least))
-        .then(|| parts[0] * a.z + parts[1] * b.z + parts[2] * c.z)
+    // Corners of one line in the grid are next to one in the world: what such a triangle has for an area is rounding, and so would its heights be. Its sides are those of others.
+    let flat = all.abs() <= 1e-9 * longest * longest;
+    (!flat && parts.iter().all(|&w| w >= least)).then(|| parts[0] * a.z + parts[1] * b.z + parts[2] * c.z)
 }
 
 /// The triangle of a cell below its diagonal (`false`) or above it has three valid samples.
