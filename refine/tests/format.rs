@@ -65,22 +65,27 @@ fn one(pm: &ProgressiveMesh, options: &EncodeOptions) -> Vec<u8> {
 fn a_file_returns_the_input_bit_for_bit_whatever_made_it() {
     for name in NAMES {
         for double in [false, true] {
-            let s = generate(name, &GenerateOptions::default().with_faces(1200).with_seed(7)).unwrap();
+            let s = generate(name, &GenerateOptions::default().with_faces(700).with_seed(7)).unwrap();
             let mesh = mesh_of(&s, double);
             let input = mesh.to_input();
             for o in runs() {
                 let pm = build(mesh.clone(), &o, &Quiet).unwrap().mesh;
-                let decoded = kinds().map(|options| {
-                    let bytes = one(&pm, &options);
-                    let decoded = decode(&bytes).unwrap();
-                    assert!(decoded.report.complete && decoded.report.damage.is_none());
-                    assert_eq!(decoded.report.streams.total(), bytes.len() as u64);
-                    assert_eq!(decoded.turns, vec![0; pm.splits.len()]);
-                    assert_eq!(decoded.scene, None);
-                    assert_same_base(&decoded.meshes[0], &pm);
-                    assert_same(&full(&decoded.meshes[0]), &input);
-                    decoded
-                });
+                // In double precision only chunks that are read alone.
+                let kinds = if double { &kinds()[1..2] } else { &kinds()[..] };
+                let decoded: Vec<_> = kinds
+                    .iter()
+                    .map(|options| {
+                        let bytes = one(&pm, options);
+                        let decoded = decode(&bytes).unwrap();
+                        assert!(decoded.report.complete && decoded.report.damage.is_none());
+                        assert_eq!(decoded.report.streams.total(), bytes.len() as u64);
+                        assert_eq!(decoded.turns, vec![0; pm.splits.len()]);
+                        assert_eq!(decoded.scene, None);
+                        assert_same_base(&decoded.meshes[0], &pm);
+                        assert_same(&full(&decoded.meshes[0]), &input);
+                        decoded
+                    })
+                    .collect();
                 let decoded = &decoded[0];
                 // Written again, the same bytes but for the plan, which sees another order: still the same mesh.
                 let again = decode(&one(&decoded.meshes[0], &EncodeOptions::default())).unwrap();
@@ -91,7 +96,7 @@ fn a_file_returns_the_input_bit_for_bit_whatever_made_it() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 10, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 8, ..ProptestConfig::default() })]
 
     #[test]
     fn random_meshes_return(name in 0..NAMES.len(), faces in 100..1500usize, seed in 0..1000u64, run in 0..5usize) {
@@ -210,6 +215,21 @@ fn chunks_that_follow_each_other_can_be_fetched_one_by_one_and_say_what_is_missi
     }
 }
 
+#[test]
+fn what_chunks_repeat_to_be_read_alone_stays_cheap() {
+    let pm = build(sample("scan", 12_000, 4), &runs()[0], &Quiet).unwrap().mesh;
+    let bits = |sequential: bool| {
+        let options = EncodeOptions::default().with_chunk(Some(1500)).with_sequential(sequential);
+        let d = decode(&one(&pm, &options)).unwrap();
+        assert!(d.report.streams.chunks >= 5);
+        [d.report.streams.connectivity, d.report.streams.places]
+            .map(|x| 8.0 * x as f64 / pm.splits.len() as f64)
+    };
+    let ([alone, near], [sequel, exact]) = (bits(false), bits(true));
+    assert!(sequel < 11.0 && alone < 23.0, "connectivity: {sequel} and {alone} bits a split");
+    assert!(near < exact + 12.0, "places: {exact} and {near} bits a split");
+}
+
 #[cfg(feature = "parallel")]
 #[test]
 fn bytes_do_not_depend_on_the_number_of_threads() {
@@ -228,13 +248,13 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
 
 /// Files of three meshes, a scene and all kinds of chunks; small enough to be damaged everywhere.
 fn victims() -> [Vec<u8>; 2] {
-    let meshes = vec![sample("scan", 260, 1), sample("polygons", 120, 1), sample("cad", 150, 1)];
+    let meshes = vec![sample("scan", 180, 1), sample("polygons", 100, 1), sample("cad", 120, 1)];
     let mut all = build_all(meshes, &[1.0; 3], &Options::default(), &Quiet).unwrap();
     let given = vec![0.25; all.meshes[2].splits.len()];
     let bounds = Bounds::with_errors(&all.meshes[2], &given, Guarantee::Proven).unwrap();
     all.meshes[2].bounds = Some(Arc::new(bounds));
     [false, true].map(|sequential| {
-        let options = EncodeOptions::default().with_chunk(Some(60)).with_sequential(sequential);
+        let options = EncodeOptions::default().with_chunk(Some(40)).with_sequential(sequential);
         encode(&all.meshes, &all.turns, b"a scene", &options).unwrap()
     })
 }
@@ -266,7 +286,7 @@ fn a_file_that_is_cut_off_brings_what_is_whole() {
 fn cut_off(bytes: &[u8]) {
     let directory = RangeReader::new(bytes).unwrap().directory().clone();
     let whole = decode(bytes).unwrap();
-    for end in (0..bytes.len()).step_by(3) {
+    for end in (0..bytes.len()).step_by(7) {
         match decode_prefix(&bytes[..end]) {
             Err(e) => assert!((end as u64) < directory.bytes(), "{end}: {e}"),
             Ok(d) => {
@@ -303,7 +323,7 @@ fn a_flipped_bit_is_an_error_that_names_its_chunk() {
 
 fn flip(bytes: &[u8]) {
     let directory = RangeReader::new(bytes).unwrap().directory().clone();
-    for at in (0..bytes.len()).step_by(2) {
+    for at in (0..bytes.len()).step_by(5) {
         let mut bad = bytes.to_vec();
         bad[at] ^= 1 << (at % 8);
         let hit = directory.chunks.iter().find(|c| c.range().contains(&(at as u64)));
@@ -410,7 +430,7 @@ fn lie_within(bytes: &[u8]) {
     let directory = RangeReader::new(bytes).unwrap().directory().clone();
     for c in &directory.chunks {
         let r = c.range();
-        for at in (r.start..r.end).step_by(17) {
+        for at in (r.start..r.end).step_by(29) {
             for change in [0x01, 0xFF] {
                 let mut bad = bytes.to_vec();
                 bad[at as usize] ^= change;

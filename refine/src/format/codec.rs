@@ -266,6 +266,9 @@ pub(super) fn read(
         moved_positions: places::empty(head.double),
         ..Default::default()
     };
+    // A split takes at least 18 bytes and a place, so this is no more than was announced for the arrays.
+    let least = 18 + if head.double { 24 } else { 12 };
+    out.reserve(count.min(usize::try_from(raw / least).ok()?));
     let mut codec = Codec::new(head, state, at, alone);
     if alone {
         codec.context(&mut streams, &ProgressiveMesh::default(), None, stored)?;

@@ -43,6 +43,9 @@ impl Extras {
     ) -> Option<()> {
         let (new, changed) = self.wedges(attributes, (vertex, code), source, out)?;
         let count = 1 + code.two_faces() as usize;
+        if C::READS && self.rows.is_none() && self.per_face == [false; 2] {
+            return Some(());
+        }
         for k in 0..2 {
             if self.per_face[k] {
                 for f in 0..count {

@@ -52,6 +52,19 @@ impl SplitBlock {
         self.wedges as usize
     }
 
+    /// Room for so many splits.
+    pub(super) fn reserve(&mut self, splits: usize) {
+        self.splits.vertex.reserve_exact(splits);
+        self.splits.left.reserve_exact(splits);
+        self.splits.right.reserve_exact(splits);
+        self.splits.code.reserve_exact(splits);
+        self.splits.error.reserve_exact(splits);
+        match &mut self.new_positions {
+            Positions::F32(p) => p.reserve_exact(splits),
+            Positions::F64(p) => p.reserve_exact(splits),
+        }
+    }
+
     /// Bytes the arrays take.
     pub fn bytes(&self) -> u64 {
         18 * self.splits.len() as u64
