@@ -177,8 +177,9 @@ mod tests {
     /// The triangles of strips, each beginning with its least corner, sorted.
     fn unrolled(strips: &Strips) -> Vec<[u32; 3]> {
         let of = |s: &[u32]| -> Vec<[u32; 3]> {
-            let turn =
-                |i: usize| if i % 2 == 0 { [s[i], s[i + 1], s[i + 2]] } else { [s[i + 1], s[i], s[i + 2]] };
+            let turn = |i: usize| {
+                if i.is_multiple_of(2) { [s[i], s[i + 1], s[i + 2]] } else { [s[i + 1], s[i], s[i + 2]] }
+            };
             (0..s.len() - 2).map(turn).collect()
         };
         normal(strips.iter().flat_map(of))
