@@ -26,6 +26,9 @@ enum LineSpace {
     Grid,
 }
 
+/// From sample to sample: columns and rows.
+type Step = [[u32; 2]; 2];
+
 /// What `--json` says of them; docs/json.md says what each field means.
 #[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct Breaklines {
@@ -47,7 +50,7 @@ impl BreaklineArgs {
         &self,
         source: &GridFile,
         warnings: &mut Warnings,
-    ) -> Result<(Vec<[[u32; 2]; 2]>, Option<Breaklines>), Failure> {
+    ) -> Result<(Vec<Step>, Option<Breaklines>), Failure> {
         let Some(path) = &self.breaklines else { return Ok((vec![], None)) };
         let failed = |what: String| Failure::Input(format!("{}: {what}", path.display()));
         let bytes = files::read_all(path).map_err(|e| failed(e.to_string()))?;
@@ -117,8 +120,8 @@ fn clip([a, b]: [[f64; 2]; 2], most: [f64; 2]) -> Option<[[f64; 2]; 2]> {
             }
         }
     }
-    // Not for coordinates beyond all numbers either.
-    if !(from <= to) {
+    // Neither is NaN: `max` and `min` pass it over.
+    if from > to {
         return None;
     }
     let at = |t: f64| -> [f64; 2] {

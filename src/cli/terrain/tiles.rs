@@ -163,7 +163,6 @@ impl Job<'_> {
             levels.push(level_report(plan, &done, self.verify.then_some(&borders), step));
             all.push(done);
         }
-        drop(work);
         drop(progress);
         let finest = all.last().map_or(&[][..], Vec::as_slice);
         let verdict = self.verify.then(|| sum(all.iter().flatten().filter_map(|d| d.verdict)));
