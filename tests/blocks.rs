@@ -97,7 +97,7 @@ fn bounds_hold_with(spacing: [f64; 2]) {
     let built = build(&grid, &options, &InMemory::default(), &Quiet).unwrap();
     let (step, unit) = (spacing[1] / spacing[0], 1.0 / spacing[0]);
     let pm = Arc::new(built.mesh);
-    let options = hierarchy::Options { rounds: 0, ..Default::default() };
+    let options = hierarchy::Options::CUTS.with_rounds(0);
     let hierarchy = Arc::new(Hierarchy::new(pm.clone(), &options).unwrap());
     let n = pm.splits.len();
     for round in 0..6 {

@@ -46,9 +46,9 @@ fn one_view_takes_fewer_faces_than_all_of_it_and_a_budget_is_kept() {
         assert_eq!(p.info("out.ply")["triangles"]["file"], r["faces"], "{flags}");
         r["faces"].as_u64().unwrap()
     };
-    let (none, all) = (faces("--tau 2 --cull none"), faces("--tau 2"));
-    let (frustum, cone) = (faces("--tau 2 --cull frustum"), faces("--tau 2 --cull cone"));
-    assert!(all <= frustum.min(cone) && frustum.max(cone) <= none && all * 10 < none * 9, "{all} {none}");
+    let (none, all) = (faces("--tau 0.25 --cull none"), faces("--tau 0.25"));
+    let (frustum, cone) = (faces("--tau 0.25 --cull frustum"), faces("--tau 0.25 --cull cone"));
+    assert!(all <= frustum.min(cone) && frustum.max(cone) <= none && all * 20 < none * 19, "{all} {none}");
     assert!(faces("--tau 8") < all);
     let budget = faces("--tau 0.1 --budget-faces 900");
     assert!((700..=900).contains(&budget), "{budget}");

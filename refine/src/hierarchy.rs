@@ -5,16 +5,18 @@
 //! For every split there is a bounding sphere, a normal cone and an error, each at least that of all splits below it in the hierarchy: what is
 //! invisible, or fine enough, has nothing below it that is not.
 //!
-//! **What the error bounds, and how far.** The error of a split is at least the distance from samples of the finest mesh (its vertices and
-//! quarters of its edges) in the region of its vertex to the mesh shown where it is not applied, measured in every state of the progressive
-//! mesh's own order, times [`Options::margin`]. That is measured, not proven: under a view the neighbours of a vertex may be coarser or finer
-//! than they were in that order. Tests, and `progmesh fly --measure-every`, measure what is shown by code of their own. Spheres, cones, and
-//! the way they nest are proven.
+//! **What the error bounds, and how far.** The finest mesh is followed at samples: its vertices and quarters of its edges; where a triangle shown stands for many, some are left out. By the
+//! ring rule ([`Rule::Rings`]) what a collapse does to the surface is the same in every mesh of the hierarchy, so the error of a split is, by proof, at least the distance of those samples to any mesh
+//! in which it is undone (`rings.rs`). What lies between samples is covered by [`Options::margin`], which is measured. By the rule of cuts ([`Rule::Cuts`]) rings are not the same, and errors are
+//! the largest that were found in some orders, with a larger margin. Tests, and `progmesh fly --measure-every`, measure what is shown by code of their own. Spheres, cones,
+//! and the way they nest are proven.
 
 mod bounds;
 mod cone;
 mod deviation;
 mod forest;
+mod rings;
+mod settled;
 mod spheres;
 
 pub use bounds::{Bounds, Guarantee, SplitBounds};
@@ -25,23 +27,65 @@ pub(crate) use forest::{Forest, SplitRows};
 use crate::progressive::{Damage, ProgressiveMesh};
 use crate::selective::Front;
 use glam::DVec3;
+use rings::{Needs, Rings};
 use std::sync::Arc;
+
+/// When a split may be made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Rule {
+    /// When all that was split before it around its vertex is: the ring of a split is the same in every mesh. Splits are put into the order of their errors, so that little else is
+    /// needed. A mesh that moves a vertex between sheets of faces falls back to cuts.
+    #[default]
+    Rings,
+    /// When the faces on its cuts are there (the l/r rule; it selects the same meshes as the four-face rule of Hoppe 1997): the weakest under which splits can be made.
+    Cuts,
+}
 
 /// How a hierarchy is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// What measured errors are multiplied by, for neighbours at other levels and for what lies between samples. At least 1. At a margin of 1
-    /// with two rounds views of five sample meshes (`tests/selective.rs`) showed up to 1.4 of the tolerance, of dragon, igea, horse and the textured bunny up to
-    /// 2.0 (their medians about 1.2); without rounds more.
+    /// When splits may be made.
+    pub rule: Rule,
+    /// What errors are multiplied by; at least 1. By the ring rule for what lies between samples.
     pub margin: f64,
-    /// After the walk in the order of the splits, how many more, in orders as views bring them about: the first by error, the second and third with parts of
-    /// the mesh out of view.
+    /// By the ring rule how often the splits are put into the order of the errors that were found. By that of cuts how many walks there are after the one in
+    /// the order of the splits, in orders as views bring them about: the first by error, the second and third with parts of the mesh out of view.
     pub rounds: u32,
+    /// Samples of the finest mesh that are followed on each face, on average; where there are more, those of edges are left out, then vertices. At most so many take up time.
+    pub samples: usize,
+}
+
+impl Options {
+    /// By the ring rule. At a margin of 1 ten views each at tolerances of 0.3, 1 and 4 pixels showed up to 1.19 of it with 100 samples (horse, the textured bunny), up to 1.33 with 60
+    /// (also fandisk, igea and bunny), up to 1.67 with 12 (horse). `docs/selective.md` has what was measured with these values.
+    pub const RINGS: Options = Options { rule: Rule::Rings, margin: 1.35, rounds: 1, samples: 100 };
+    /// By the rule of cuts. At a margin of 1 with two rounds views of five sample meshes (`tests/selective.rs`) showed up to 1.4 of the tolerance, of dragon, igea, horse and the
+    /// textured bunny up to 2.0 (their medians about 1.2); without rounds more.
+    pub const CUTS: Options = Options { rule: Rule::Cuts, margin: 2.25, rounds: 2, samples: 12 };
+
+    /// Sets [`Options::margin`].
+    pub fn with_margin(mut self, margin: f64) -> Self {
+        self.margin = margin;
+        self
+    }
+
+    /// Sets [`Options::samples`].
+    pub fn with_samples(mut self, samples: usize) -> Self {
+        self.samples = samples;
+        self
+    }
+
+    /// Sets [`Options::rounds`].
+    pub fn with_rounds(mut self, rounds: u32) -> Self {
+        self.rounds = rounds;
+        self
+    }
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { margin: 2.25, rounds: 2 }
+        Options::RINGS
     }
 }
 
@@ -53,18 +97,99 @@ pub struct Hierarchy {
     pub(crate) bounds: Arc<Bounds>,
 }
 
-/// Goes through all splits, so that every reference is followed, and gives the hierarchy and the finest mesh.
-fn finest(mesh: &ProgressiveMesh) -> Result<(Forest, Front), Damage> {
+/// Goes through all splits, so that every reference is followed, and gives the hierarchy and the finest mesh; and by the ring rule, if it holds, the longest chain of splits
+/// that need each other up to each.
+fn finest(mesh: &ProgressiveMesh, rule: Rule) -> Result<(Forest, Front, Option<Vec<u32>>), Damage> {
     // Lengths, references and wedges, in the order of the splits.
     mesh.cursor()?.seek(usize::MAX)?;
     let mut forest = Forest::new(mesh);
     let mut front = Front::new(mesh, &forest);
     let mut row_before = std::mem::take(&mut forest.row_before);
+    let mut rings = (rule == Rule::Rings).then(|| Rings::new(mesh, &front));
     for i in 0..forest.len() as u32 {
+        if let Some(r) = &mut rings {
+            r.before(mesh, &forest, &front, i)?;
+        }
         front.split(mesh, &forest, i, Some(&mut row_before))?;
+        if let Some(r) = &mut rings {
+            r.after(mesh, &forest, &front, i);
+        }
     }
     forest.row_before = row_before;
-    Ok((forest, front))
+    let settled = rings.and_then(Rings::finish);
+    let turns = match settled {
+        Some((needs, turns)) => {
+            forest.needs = needs;
+            Some(turns)
+        }
+        None => {
+            forest.needs = Needs::of_cuts(mesh);
+            None
+        }
+    };
+    Ok((forest, front, turns))
+}
+
+/// The splits by their turns.
+fn by_turns(turns: &[u32]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..turns.len() as u32).collect();
+    order.sort_by_key(|&i| turns[i as usize]);
+    order
+}
+
+/// A mesh whose splits are in the order of the ring rule.
+struct Settled {
+    /// Which split of the mesh before is now which.
+    order: Vec<u32>,
+    mesh: ProgressiveMesh,
+    forest: Forest,
+    bounds: Bounds,
+}
+
+impl Settled {
+    /// Puts splits into the order of their errors, and measures them; `None` if the ring rule does not hold for the mesh.
+    fn measure(mesh: &ProgressiveMesh, options: &Options) -> Result<Option<Settled>, Damage> {
+        let mut order: Vec<u32> = (0..mesh.splits.len() as u32).collect();
+        let mut now = std::borrow::Cow::Borrowed(mesh);
+        for _ in 0..options.rounds {
+            let (forest, front, turns) = finest(&now, Rule::Rings)?;
+            if turns.is_none() {
+                return Ok(None);
+            }
+            let (errors, diagonal) = settled::estimate(&now, &forest, front, options);
+            let next = by_errors(&now, errors, diagonal);
+            order = next.iter().map(|&i| order[i as usize]).collect();
+            now = std::borrow::Cow::Owned(now.reordered(&next).map_err(|e| Damage::Fan(e.0 as usize))?);
+        }
+        let (forest, front, turns) = finest(&now, Rule::Rings)?;
+        let Some(turns) = turns else { return Ok(None) };
+        let mut bounds = settled::measure(&now, &forest, front, options);
+        (bounds.guarantee, bounds.turns) = (Guarantee::Settled, turns);
+        Ok(Some(Settled { order, mesh: now.into_owned(), forest, bounds }))
+    }
+}
+
+/// Classes of errors for each factor of two. Within one, splits keep their order: between 1 and 100 little changes.
+const CLASSES: f64 = 2.0;
+/// Errors below this, of the diagonal, are of one class. On fandisk, where most are noise, an order by noise chains splits that have nothing to do with each other: nine times as many
+/// faces are shown.
+const FLOOR: f64 = 1.0 / 65536.0;
+
+/// The splits by classes of their errors, the largest first, and none before one whose faces it needs.
+fn by_errors(mesh: &ProgressiveMesh, mut errors: Vec<f64>, diagonal: f64) -> Vec<u32> {
+    for (i, on) in mesh.dependencies().into_iter().enumerate().rev() {
+        let e = errors[i];
+        for d in on.into_iter().filter(|&d| d != crate::aif::NONE) {
+            let up = &mut errors[d as usize];
+            *up = up.max(e);
+        }
+    }
+    let floor = FLOOR * diagonal;
+    let class = |e: f64| (e.max(floor).log2() * CLASSES).floor();
+    let mut order: Vec<u32> = (0..errors.len() as u32).collect();
+    // Stable.
+    order.sort_by(|&a, &b| class(errors[b as usize]).total_cmp(&class(errors[a as usize])));
+    order
 }
 
 /// The finest mesh, about the middle of its box.
@@ -93,23 +218,63 @@ impl Finest {
 }
 
 impl Hierarchy {
-    /// Builds the hierarchy: goes through all splits once in each direction. Bounds are those that the mesh carries ([`ProgressiveMesh::bounds`]); if it has none they are
-    /// measured, which takes about 70 microseconds a vertex.
+    /// Builds the hierarchy: goes through all splits once in each direction. Bounds are those that the mesh carries ([`ProgressiveMesh::bounds`]), and the rule the one they are for;
+    /// if it has none they are measured, which takes about 90 microseconds a vertex.
+    ///
+    /// By the ring rule the splits come in another order than in `mesh`, and so have other numbers: see [`Hierarchy::mesh`].
     ///
     /// Errors: a damaged progressive mesh, or bounds that are not for it or do not nest; every reference is followed here, so that views meet no damage.
     pub fn new(mesh: Arc<ProgressiveMesh>, options: &Options) -> Result<Hierarchy, Damage> {
-        let (forest, front) = finest(&mesh)?;
-        let bounds = match &mesh.bounds {
-            Some(bounds) => {
-                bounds.check(&mesh, &forest)?;
-                bounds.clone()
-            }
-            None => Arc::new(deviation::measure(&mesh, &forest, &front, options)),
-        };
+        if let Some(bounds) = &mesh.bounds {
+            let bounds = bounds.clone();
+            return Self::with_bounds(mesh, bounds);
+        }
+        if options.rule == Rule::Rings
+            && let Some(s) = Settled::measure(&mesh, options)?
+        {
+            let mut bounds = s.bounds;
+            bounds.turns = Vec::new();
+            return Ok(Hierarchy { mesh: Arc::new(s.mesh), forest: s.forest, bounds: Arc::new(bounds) });
+        }
+        let (forest, front, _) = finest(&mesh, Rule::Cuts)?;
+        let bounds = Arc::new(deviation::measure(&mesh, &forest, &front, options));
         Ok(Hierarchy { mesh, forest, bounds })
     }
 
-    /// The progressive mesh.
+    fn with_bounds(mesh: Arc<ProgressiveMesh>, bounds: Arc<Bounds>) -> Result<Hierarchy, Damage> {
+        let n = mesh.splits.len();
+        if bounds.len() != n {
+            return Err(Damage::Length { what: "bounds", len: bounds.len(), want: n });
+        }
+        if bounds.guarantee() != Guarantee::Settled {
+            let (forest, _, _) = finest(&mesh, Rule::Cuts)?;
+            bounds.check(&mesh, &forest)?;
+            return Ok(Hierarchy { mesh, forest, bounds });
+        }
+        if bounds.turns.len() != n {
+            return Err(Damage::Length { what: "turns", len: bounds.turns.len(), want: n });
+        }
+        // The checks before anything is put into another order.
+        mesh.cursor()?.seek(usize::MAX)?;
+        let mut mesh = mesh.reordered(&by_turns(&bounds.turns)).map_err(|e| Damage::Bounds(e.0 as usize))?;
+        let mut bounds = match mesh.bounds.take() {
+            Some(b) => Arc::unwrap_or_clone(b),
+            None => return Err(Damage::Length { what: "bounds", len: 0, want: n }),
+        };
+        let (forest, _, turns) = finest(&mesh, Rule::Rings)?;
+        // The longest chains are what they were: so what splits need is, too.
+        let other = |t: &Vec<u32>| t.iter().zip(&bounds.turns).position(|(a, b)| a != b);
+        match turns.as_ref().map(other) {
+            Some(None) => {}
+            Some(Some(i)) => return Err(Damage::Bounds(i)),
+            None => return Err(Damage::Bounds(0)),
+        }
+        bounds.turns = Vec::new();
+        bounds.check(&mesh, &forest)?;
+        Ok(Hierarchy { mesh: Arc::new(mesh), forest, bounds: Arc::new(bounds) })
+    }
+
+    /// The progressive mesh, with its splits in the order in which they are numbered here.
     pub fn mesh(&self) -> &ProgressiveMesh {
         &self.mesh
     }
@@ -119,14 +284,17 @@ impl Hierarchy {
         self.forest.len()
     }
 
-    /// The splits that split `i` depends on directly: the one that made the vertex as it splits it, and those that made the later of the faces
-    /// on each of its cuts. Panics if there is no such split.
-    pub fn dependencies(&self, i: usize) -> impl Iterator<Item = usize> + use<> {
-        self.forest
-            .needs(&self.mesh, i as u32)
-            .into_iter()
-            .filter(|&d| d != crate::aif::NONE)
-            .map(|d| d as usize)
+    /// When splits may be made.
+    pub fn rule(&self) -> Rule {
+        match self.bounds.guarantee() {
+            Guarantee::Settled => Rule::Rings,
+            _ => Rule::Cuts,
+        }
+    }
+
+    /// The splits that split `i` depends on directly, by [`Hierarchy::rule`], as far as they do not follow from each other. Panics if there is no such split.
+    pub fn dependencies(&self, i: usize) -> impl Iterator<Item = usize> + use<'_> {
+        self.forest.needs.of(i as u32).iter().map(|&d| d as usize)
     }
 
     /// The bounds of split `i`. Panics if there is no such split.

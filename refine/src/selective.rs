@@ -1,8 +1,7 @@
 //! View-dependent refinement (Hoppe 1997, 1998): of a progressive mesh only the splits that a view needs.
 //!
 //! A [`View`] holds one mesh, a cut through the vertex hierarchy of a shared [`Hierarchy`]. A [`Lens`] says what is needed: a split whose region may be seen, and whose
-//! error may look larger than the tolerance. [`View::adapt`] applies splits and undoes them until just those needed are applied, and what they depend on (the l/r rule: see
-//! [`crate::progressive`]).
+//! error may look larger than the tolerance. [`View::adapt`] applies splits and undoes them until just those needed are applied, and what they depend on ([`crate::hierarchy::Rule`]).
 //!
 //! Guaranteed: without hysteresis and limits, what is applied depends on the lens alone, whatever came before: the *least closed set* with all needed splits. At a
 //! tolerance of 0 without culling that is the finest mesh, at infinity the base. After every single step the mesh is one that the progressive mesh's splits make
@@ -39,7 +38,7 @@ use std::sync::Arc;
 
 /// A mesh between base and full detail, finer where a view needs it.
 ///
-/// Memory: about 100 B for every vertex shown, and 14 B (26 B with attributes) for every vertex of the finest mesh; [`View::bytes`] counts.
+/// Memory: about 100 B for every vertex shown, and 18 B (30 B with attributes) for every vertex of the finest mesh; [`View::bytes`] counts.
 #[derive(Clone, Debug)]
 pub struct View {
     hierarchy: Arc<Hierarchy>,
@@ -50,10 +49,14 @@ pub struct View {
     last: List,
     /// Where each split is in the one list or the other.
     place: Vec<u32>,
+    /// Applied splits that depend on each.
+    dependents: Vec<u16>,
     /// Bits for walks over what a split depends on; none is set between walks.
     marked: Vec<u64>,
     /// Where the scans of the two lists go on after a limit cut them short.
     resume: [usize; 2],
+    /// A split that was needed when a limit cut short what it depends on.
+    unfinished: Option<u32>,
     faces_before: usize,
 }
 
@@ -67,8 +70,10 @@ impl View {
             open: List::default(),
             last: List::default(),
             place: vec![NONE; n],
+            dependents: vec![0; n],
             marked: vec![0; n.div_ceil(64)],
             resume: [0; 2],
+            unfinished: None,
             faces_before: 0,
             hierarchy,
         };
@@ -117,29 +122,31 @@ impl View {
     /// Undoes split `i` if it is applied and nothing applied depends on it; says whether it did. O(valence). Panics if there is no such split.
     pub fn collapse(&mut self, i: usize) -> bool {
         assert!(i < self.hierarchy.splits(), "split {i} of {}", self.hierarchy.splits());
-        let legal = self.front.is_applied(i as u32) && self.front.is_free(i as u32);
+        let legal = self.front.is_applied(i as u32) && self.is_free(i as u32);
         if legal {
             self.undo(i as u32);
         }
         legal
     }
 
-    /// True if all that split `i` depends on is applied, and it is not: the l/r rule. Panics if there is no such split.
+    /// True if all that split `i` depends on is applied, and it is not. Panics if there is no such split.
     pub fn may_split(&self, i: usize) -> bool {
-        let applied = |d: u32| d == NONE || self.front.is_applied(d);
         !self.is_applied(i)
-            && self.hierarchy.forest.needs(self.hierarchy.mesh(), i as u32).into_iter().all(applied)
+            && self.hierarchy.forest.needs.of(i as u32).iter().all(|&d| self.front.is_applied(d))
     }
 
     /// True if split `i` is applied and nothing applied depends on it. Panics if there is no such split.
     pub fn may_collapse(&self, i: usize) -> bool {
-        self.is_applied(i) && self.front.is_free(i as u32)
+        self.is_applied(i) && self.is_free(i as u32)
     }
 
     /// Bytes held: those that grow with the mesh shown, and tables over the finest mesh.
     pub fn bytes(&self) -> (usize, usize) {
         let (shown, tables) = self.front.bytes();
-        (shown + self.open.bytes() + self.last.bytes(), tables + 4 * self.place.len() + 8 * self.marked.len())
+        (
+            shown + self.open.bytes() + self.last.bytes(),
+            tables + 4 * self.place.len() + 2 * self.dependents.len() + 8 * self.marked.len(),
+        )
     }
 
     /// Appends split `i` and all it depends on that is not applied, in an order in which they can be.
@@ -151,8 +158,7 @@ impl View {
         }
         let mut k = from;
         while let Some(&j) = out.get(k) {
-            for d in self.hierarchy.forest.needs(self.hierarchy.mesh(), j).into_iter().filter(|&d| d != NONE)
-            {
+            for &d in self.hierarchy.forest.needs.of(j) {
                 let (word, bit) = (d as usize / 64, 1u64 << (d % 64));
                 if self.marked[word] & bit == 0 && !self.front.is_applied(d) {
                     self.marked[word] |= bit;
@@ -175,9 +181,10 @@ impl View {
         if done.is_err() {
             return;
         }
-        self.open.remove(i, &mut self.place);
-        self.last.push(h, i, &mut self.place);
-        for d in h.forest.needs(h.mesh(), i).into_iter().filter(|&d| d != NONE) {
+        let e = self.open.remove(i, &mut self.place).unwrap_or_else(|| Entry::of(h, i));
+        self.last.put(e, &mut self.place);
+        for &d in h.forest.needs.of(i) {
+            self.dependents[d as usize] += 1;
             self.last.remove(d, &mut self.place);
         }
         h.forest.nodes(i).into_iter().for_each(|k| self.offer(k));
@@ -193,13 +200,20 @@ impl View {
             }
         }
         self.front.unsplit(h.mesh(), &h.forest, i);
-        self.last.remove(i, &mut self.place);
-        self.open.push(&h, i, &mut self.place);
-        for d in h.forest.needs(h.mesh(), i).into_iter().filter(|&d| d != NONE) {
-            if self.front.is_free(d) && self.place[d as usize] == NONE {
+        let e = self.last.remove(i, &mut self.place).unwrap_or_else(|| Entry::of(&h, i));
+        self.open.put(e, &mut self.place);
+        for &d in h.forest.needs.of(i) {
+            self.dependents[d as usize] -= 1;
+            if self.is_free(d) && self.place[d as usize] == NONE {
                 self.last.push(&h, d, &mut self.place);
             }
         }
+    }
+
+    /// Nothing applied depends on split `i`, in the hierarchy or beside it.
+    #[inline]
+    fn is_free(&self, i: u32) -> bool {
+        self.dependents[i as usize] == 0
     }
 
     /// Node `k` is in the mesh now: what replaces it can be applied.

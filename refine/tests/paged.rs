@@ -20,7 +20,7 @@ const PLENTY: usize = 1 << 30;
 /// A file with pages; small meshes, so bounds are measured in little.
 fn file(name: &str, faces: usize, placement: Option<Placement>) -> Vec<u8> {
     let mut pm = build(sample(name, faces, 5), &options(Method::Quadric, placement), &Quiet).unwrap().mesh;
-    let o = hierarchy::Options { rounds: 0, ..Default::default() };
+    let o = hierarchy::Options::CUTS.with_rounds(0);
     pm.bounds = Some(Arc::new(Bounds::measure(&pm, &o).unwrap()));
     let o = EncodeOptions::default().with_any_order(true).with_pages(true).with_chunk(Some(512));
     encode(&[pm], &[], &[], &o).unwrap()

@@ -19,9 +19,20 @@ fn progressive(name: &str, faces: usize, method: Method, placement: Option<Place
     build(sample(name, faces, 5), &options(method, placement), &Quiet).unwrap().mesh
 }
 
-fn hierarchy(name: &str, faces: usize) -> Arc<Hierarchy> {
+const RULES: [HierarchyOptions; 2] = [HierarchyOptions::RINGS, HierarchyOptions::CUTS];
+
+fn hierarchy_by(rule: &HierarchyOptions, name: &str, faces: usize) -> Arc<Hierarchy> {
     let pm = Arc::new(progressive(name, faces, Method::Quadric, None));
-    Arc::new(Hierarchy::new(pm, &HierarchyOptions::default()).unwrap())
+    Arc::new(Hierarchy::new(pm, rule).unwrap())
+}
+
+/// Every name by both rules.
+fn both<'a>(names: &'a [&'a str]) -> impl Iterator<Item = (&'a str, &'static HierarchyOptions)> {
+    names.iter().flat_map(|&name| RULES.iter().map(move |r| (name, r)))
+}
+
+fn hierarchy(name: &str, faces: usize) -> Arc<Hierarchy> {
+    hierarchy_by(&HierarchyOptions::RINGS, name, faces)
 }
 
 struct Random(u64);
@@ -185,7 +196,7 @@ fn the_l_r_rule_allows_what_the_four_face_rule_allows() {
         ("nonmanifold", Method::Quadric, None),
     ] {
         let pm = Arc::new(progressive(name, 500, method, placement));
-        let h = Arc::new(Hierarchy::new(pm.clone(), &HierarchyOptions::default()).unwrap());
+        let h = Arc::new(Hierarchy::new(pm.clone(), &HierarchyOptions::CUTS).unwrap());
         let oracle = FourFaces::new(&pm);
         let mut view = View::new(h);
         let mut random = Random(11);
@@ -221,8 +232,8 @@ fn the_l_r_rule_allows_what_the_four_face_rule_allows() {
 
 #[test]
 fn forced_splits_close_over_all_dependencies_and_everything_can_be_undone() {
-    for name in NAMES {
-        let h = hierarchy(name, 1500);
+    for (name, rule) in both(&NAMES) {
+        let h = hierarchy_by(rule, name, 1500);
         let n = h.splits();
         let mut view = View::new(h.clone());
         let base = view.to_input();
@@ -284,8 +295,8 @@ fn camera(h: &Hierarchy, random: &mut Random, distance: f64, perspective: bool) 
 
 #[test]
 fn the_cut_depends_on_the_view_alone_and_is_the_least_closed_one() {
-    for name in NAMES {
-        let h = hierarchy(name, 2500);
+    for (name, rule) in both(&NAMES) {
+        let h = hierarchy_by(rule, name, 2500);
         let mut view = View::new(h.clone());
         let mut random = Random(17);
         let mut partly = 0;
@@ -451,8 +462,8 @@ fn dirty_ranges_hold_all_that_changed_and_not_all_there_is() {
 
 #[test]
 fn bounds_hold_what_is_below_and_nest() {
-    for name in ["sphere", "scan", "cad", "terrain"] {
-        let h = hierarchy(name, 1500);
+    for (name, rule) in both(&["sphere", "scan", "cad", "terrain"]) {
+        let h = hierarchy_by(rule, name, 1500);
         let pm = h.mesh();
         let n0 = pm.base_vertices();
         // The splits that make the vertex of each split.
@@ -508,8 +519,8 @@ fn measured(h: &Hierarchy, view: &View, camera: &Camera, random: &mut Random, sa
 
 #[test]
 fn what_is_shown_deviates_by_less_than_the_tolerance() {
-    for name in ["sphere", "scan", "terrain", "torus", "cad"] {
-        let h = hierarchy(name, 12_000);
+    for (name, rule) in both(&["sphere", "scan", "terrain", "torus", "cad"]) {
+        let h = hierarchy_by(rule, name, 12_000);
         let mut view = View::new(h.clone());
         let mut random = Random(23);
         let mut ratios = Vec::new();

@@ -47,7 +47,7 @@ fn flight(h: &Arc<Hierarchy>) -> Vec<Frame> {
 #[test]
 fn a_flight_is_the_same_on_one_two_and_five_threads() {
     let pm = build(sample("scan", 36_000, 5), &options(Method::Quadric, None), &Quiet).unwrap().mesh;
-    let o = hierarchy::Options { rounds: 0, ..Default::default() };
+    let o = hierarchy::Options::RINGS.with_samples(12);
     let h = Arc::new(Hierarchy::new(Arc::new(pm), &o).unwrap());
     let with =
         |n: usize| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(|| flight(&h));

@@ -49,7 +49,7 @@ pub(crate) struct Args {
     /// extract and fly need for --memory
     #[arg(long, help_heading = "File", conflicts_with = "sequential")]
     random_access: bool,
-    /// Measure and write what view-dependent refinement decides by, so that extract and fly begin at once: some 5 bytes a vertex; with --random-access also what
+    /// Measure and write what view-dependent refinement decides by, so that extract and fly begin at once: 5 to 7 bytes a vertex; with --random-access also what
     /// extract and fly need for --memory
     #[arg(long, help_heading = "File")]
     bounds: bool,
@@ -100,7 +100,11 @@ impl Args {
             let mut built = built;
             let measuring = Instant::now();
             if self.bounds {
-                let options = hierarchy::Options::default();
+                // Out of core, rings are not all at hand.
+                let options = match self.random_access {
+                    true => hierarchy::Options::CUTS,
+                    false => hierarchy::Options::RINGS,
+                };
                 built
                     .scene
                     .measure_bounds(&options)

@@ -6,8 +6,8 @@ use glam::DVec3;
 use std::ops::Range;
 
 /// Bytes in memory of the bounds of so many splits.
-pub(super) fn raw_bytes(splits: usize) -> u64 {
-    32 + 8 * splits as u64
+pub(super) fn raw_bytes(guarantee: Guarantee, splits: usize) -> u64 {
+    32 + (8 + 4 * (guarantee == Guarantee::Settled) as u64) * splits as u64
 }
 
 /// The parts of a split's bounds: error, radius, axis, angle.
@@ -35,6 +35,20 @@ pub(super) fn code<C: Coder>(c: &mut C, models: &mut [Number; 5], last: &mut Par
     }
 }
 
+#[derive(Default)]
+struct Turn {
+    model: Number,
+    last: u32,
+}
+
+impl Turn {
+    fn code<C: Coder>(&mut self, c: &mut C, value: u32) -> u32 {
+        let difference = c.signed(&mut self.model, value as i64 - self.last as i64);
+        self.last = (self.last as i64).wrapping_add(difference) as u32;
+        self.last
+    }
+}
+
 /// The bytes of a chunk.
 pub(super) fn write(bounds: &Bounds, range: Range<usize>) -> Option<Vec<u8>> {
     let (origin, diagonal) = bounds.extent();
@@ -44,8 +58,12 @@ pub(super) fn write(bounds: &Bounds, range: Range<usize>) -> Option<Vec<u8>> {
     }
     let mut e = Encoder::default();
     let (mut models, mut last) = Default::default();
-    for &b in bounds.of.get(range)? {
+    let mut turn = Turn::default();
+    for (&b, i) in bounds.of.get(range.clone())?.iter().zip(range) {
         code(&mut e, &mut models, &mut last, parts(b));
+        if bounds.guarantee() == Guarantee::Settled {
+            turn.code(&mut e, *bounds.turns.get(i)?);
+        }
     }
     e.finish(&mut out);
     Some(out)
@@ -61,21 +79,27 @@ pub(super) fn read(bytes: &[u8], count: usize, raw: u64) -> Option<Bounds> {
         f64::from_le_bytes(eight)
     });
     let origin = DVec3::new(x, y, z);
-    if raw != raw_bytes(count) || !origin.is_finite() || !(diagonal.is_finite() && diagonal >= 0.0) {
+    let guarantee = Guarantee::from_code(guarantee)?;
+    if raw != raw_bytes(guarantee, count) || !origin.is_finite() || !(diagonal.is_finite() && diagonal >= 0.0)
+    {
         return None;
     }
     let mut d = Decoder::new(stream)?;
     let (mut models, mut last) = Default::default();
     // The directory promises no more than 64 times the bytes that are there.
     let mut of = Vec::with_capacity(count);
+    let (mut turns, mut turn) = (Vec::new(), Turn::default());
     for _ in 0..count {
         code(&mut d, &mut models, &mut last, Parts::default());
         of.push(packed(last));
+        if guarantee == Guarantee::Settled {
+            turns.push(turn.code(&mut d, 0));
+        }
         if d.spent() {
             return None;
         }
     }
-    Some(Bounds { origin, diagonal, guarantee: Guarantee::from_code(guarantee)?, of })
+    Some(Bounds { origin, diagonal, guarantee, of, turns })
 }
 
 #[cfg(test)]
@@ -87,7 +111,7 @@ mod tests {
         #[test]
         fn what_was_written_is_read_and_less_is_damage(
             of in prop::collection::vec((any::<u16>(), any::<u16>(), any::<u32>()), 1..60),
-            code in 0u8..3,
+            code in 0u8..4,
             origin in prop::array::uniform3(-1e9..1e9f64),
             from in 0usize..60,
         ) {
@@ -97,12 +121,13 @@ mod tests {
                 diagonal: 7.5,
                 guarantee: Guarantee::from_code(code).unwrap(),
                 of: of.iter().map(packed).collect(),
+                turns: of.iter().filter(|_| code == 3).map(|b| b.2).collect(),
             };
             let range = from.min(of.len() - 1)..of.len();
             let bytes = write(&bounds, range.clone()).unwrap();
-            let raw = raw_bytes(range.len());
+            let raw = raw_bytes(bounds.guarantee, range.len());
             prop_assert_eq!(read(&bytes, range.len(), raw), Some(bounds.slice(range.clone())));
-            prop_assert_eq!(read(&bytes, range.len() + 200, raw_bytes(range.len() + 200)), None);
+            prop_assert_eq!(read(&bytes, range.len() + 200, raw_bytes(bounds.guarantee, range.len() + 200)), None);
             prop_assert_eq!(read(&bytes, range.len(), raw + 1), None);
             for end in 0..33 {
                 prop_assert_eq!(read(&bytes[..end], range.len(), raw), None);

@@ -10,7 +10,7 @@ use super::pages;
 use super::places;
 use super::plan::{Layout, Piece, Plan};
 use super::splits::{self, Counts};
-use crate::hierarchy::{Bounds, Forest};
+use crate::hierarchy::{Bounds, Forest, Guarantee};
 use crate::progressive::{Damage, ProgressiveMesh, RowsOf};
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ pub struct EncodeOptions {
     pub quantize: Option<u32>,
     /// Chunks follow each other: none can be read before all that stand before it. Files are smaller.
     pub sequential: bool,
-    /// Beside every chunk, what refining out of core takes ([`crate::paged`]): links of the vertex hierarchy. Only without [`EncodeOptions::sequential`], of meshes with bounds
+    /// Beside every chunk, what refining out of core takes ([`crate::paged`]): links of the vertex hierarchy. Only without [`EncodeOptions::sequential`], of meshes with bounds by the rule of cuts
     /// ([`ProgressiveMesh::bounds`]).
     pub pages: bool,
     /// Splits of a chunk, at most but for those of a single vertex; by default 16,384, and 8,192 of chunks that follow each other. With smaller ones less has to be fetched for a region,
@@ -94,8 +94,10 @@ pub enum EncodeError {
     /// A mesh's parts do not go together in a way that [`Damage`] has no word for.
     #[error("mesh {0}: its arrays contradict each other")]
     Inconsistent(usize),
-    /// Pages are wanted of a mesh without bounds.
-    #[error("mesh {0}: it has no bounds, which refining out of core takes; measure them first")]
+    /// Pages are wanted of a mesh without bounds, or with bounds by the ring rule.
+    #[error(
+        "mesh {0}: it has no bounds by the rule of cuts, which refining out of core takes; measure them first"
+    )]
     NoBounds(usize),
     /// Quantisation by other than 2 to 30 bits.
     #[error("quantising to {0} bits: 2 to 30 are possible")]
@@ -156,7 +158,8 @@ pub fn encode(
         if pm.bounds.as_ref().is_some_and(|b| b.len() != pm.splits.len()) {
             return Err(EncodeError::Inconsistent(m));
         }
-        if options.pages && !options.sequential && pm.bounds.is_none() {
+        let settled = |b: &Arc<Bounds>| b.guarantee() == Guarantee::Settled;
+        if options.pages && !options.sequential && pm.bounds.as_ref().is_none_or(settled) {
             return Err(EncodeError::NoBounds(m));
         }
         let places: Vec<u32> =
@@ -344,7 +347,13 @@ fn encode_mesh(
 fn bounds_of(splits: &Part, bounds: &Bounds) -> Option<Part> {
     let (first, count) = (splits.chunk.first as usize, splits.chunk.count as usize);
     let bytes = bounds::write(bounds, first..first + count)?;
-    let mut p = part(ChunkType::BOUNDS, false, splits.chunk.mesh, bounds::raw_bytes(count), bytes);
+    let mut p = part(
+        ChunkType::BOUNDS,
+        false,
+        splits.chunk.mesh,
+        bounds::raw_bytes(bounds.guarantee(), count),
+        bytes,
+    );
     p.turn = splits.turn;
     let Chunk { first, count, band, subtree, .. } = splits.chunk;
     p.chunk = Chunk { first, count, band, subtree, ..p.chunk };

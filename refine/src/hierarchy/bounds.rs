@@ -1,6 +1,7 @@
 //! Bounds of splits, packed into eight bytes.
 
 use super::cone::Cone;
+use super::spheres::Extent;
 use crate::progressive::{Damage, ProgressiveMesh};
 use crate::view::NormalCone;
 use glam::{DVec3, Vec3};
@@ -29,6 +30,8 @@ pub enum Guarantee {
     Proven,
     /// Differences of height over a plane, proven by whoever gave them; distances are no larger.
     Vertical,
+    /// Distances of samples, proven for meshes that keep the ring rule ([`super::Rule::Rings`]), with a margin for what lies between them.
+    Settled,
 }
 
 impl Guarantee {
@@ -37,11 +40,13 @@ impl Guarantee {
             Guarantee::Measured => 0,
             Guarantee::Proven => 1,
             Guarantee::Vertical => 2,
+            Guarantee::Settled => 3,
         }
     }
 
     pub(crate) fn from_code(code: u8) -> Option<Guarantee> {
-        [Guarantee::Measured, Guarantee::Proven, Guarantee::Vertical].into_iter().find(|g| g.code() == code)
+        let all = [Guarantee::Measured, Guarantee::Proven, Guarantee::Vertical, Guarantee::Settled];
+        all.into_iter().find(|g| g.code() == code)
     }
 }
 
@@ -56,6 +61,9 @@ pub struct Bounds {
     pub(crate) diagonal: f64,
     pub(crate) guarantee: Guarantee,
     pub(crate) of: Vec<Packed>,
+    /// Of settled bounds: splits with a lower turn come before those with a higher one, so that the order they were measured in comes back from any other. Empty for others, and
+    /// in hierarchies.
+    pub(crate) turns: Vec<u32>,
 }
 
 /// The bounds of a split as they are kept.
@@ -90,7 +98,14 @@ impl Bounds {
     ///
     /// Errors: a damaged progressive mesh.
     pub fn measure(mesh: &ProgressiveMesh, options: &super::Options) -> Result<Bounds, Damage> {
-        let (forest, front) = super::finest(mesh)?;
+        if options.rule == super::Rule::Rings
+            && let Some(settled) = super::Settled::measure(mesh, options)?
+        {
+            let mut back = vec![0; settled.order.len()];
+            settled.order.iter().zip(0..).for_each(|(&i, k)| back[i as usize] = k);
+            return Ok(settled.bounds.reordered(&back).unwrap_or_default());
+        }
+        let (forest, front, _) = super::finest(mesh, super::Rule::Cuts)?;
         Ok(super::deviation::measure(mesh, &forest, &front, options))
     }
 
@@ -104,11 +119,21 @@ impl Bounds {
         errors: &[f64],
         guarantee: Guarantee,
     ) -> Result<Bounds, Damage> {
+        Self::of_errors(mesh, errors, guarantee, &[])
+    }
+
+    fn of_errors(
+        mesh: &ProgressiveMesh,
+        errors: &[f64],
+        guarantee: Guarantee,
+        extents: &[Extent],
+    ) -> Result<Bounds, Damage> {
         if errors.len() != mesh.splits.len() {
             return Err(Damage::Length { what: "bounds", len: errors.len(), want: mesh.splits.len() });
         }
-        let (forest, front) = super::finest(mesh)?;
-        let mut bounds = super::spheres::around(mesh, &forest, &super::Finest::new(mesh, &forest, &front));
+        let (forest, front, _) = super::finest(mesh, super::Rule::Cuts)?;
+        let finest = super::Finest::new(mesh, &forest, &front);
+        let mut bounds = super::spheres::around(mesh, &forest, &finest, extents);
         bounds.guarantee = guarantee;
         // What is no number promises nothing.
         let known = |e: &f64| if e.is_nan() { f64::INFINITY } else { e.max(0.0) };
@@ -195,7 +220,8 @@ impl Bounds {
 
     /// Those of the splits in a range, which are numbered from 0 then. Panics if there are no such splits.
     pub fn slice(&self, range: std::ops::Range<usize>) -> Bounds {
-        Bounds { of: self.of[range].to_vec(), ..self.without_splits() }
+        let turns = if self.turns.is_empty() { Vec::new() } else { self.turns[range.clone()].to_vec() };
+        Bounds { of: self.of[range].to_vec(), turns, ..self.without_splits() }
     }
 
     /// Appends the bounds of the splits that follow; false (and nothing done) if they are of another mesh.
@@ -203,19 +229,21 @@ impl Bounds {
         let same = self.without_splits() == next.without_splits();
         if same {
             self.of.extend_from_slice(&next.of);
+            self.turns.extend_from_slice(&next.turns);
         }
         same
     }
 
     fn without_splits(&self) -> Bounds {
         let (origin, diagonal, guarantee) = (self.origin, self.diagonal, self.guarantee);
-        Bounds { origin, diagonal, guarantee, of: Vec::new() }
+        Bounds { origin, diagonal, guarantee, of: Vec::new(), turns: Vec::new() }
     }
 
     /// Those of the same mesh with split `order[k]` as the `k`-th; `None` if there is no such split.
     pub fn reordered(&self, order: &[u32]) -> Option<Bounds> {
         let of = order.iter().map(|&i| self.of.get(i as usize).copied()).collect::<Option<_>>()?;
-        Some(Bounds { of, ..self.without_splits() })
+        let turns = order.iter().filter_map(|&i| self.turns.get(i as usize).copied()).collect();
+        Some(Bounds { of, turns, ..self.without_splits() })
     }
 
     /// For a mesh of which every vertex has moved by at most `by`: errors grow by twice that, as both meshes have moved, and spheres and cones are found anew.
@@ -223,7 +251,13 @@ impl Bounds {
     /// Errors: a damaged progressive mesh, or one of another size.
     pub fn after_moving(&self, mesh: &ProgressiveMesh, by: f64) -> Result<Bounds, Damage> {
         let errors: Vec<f64> = (0..self.len()).map(|i| self.error(i) + 2.0 * by).collect();
-        Bounds::with_errors(mesh, &errors, self.guarantee)
+        // Settled spheres are larger than those around what comes of a split; of cones nothing is known.
+        let widened = |i: usize| Extent::beyond(self.radius(i) + 2.0 * by, NormalCone::ALL);
+        let settled = self.guarantee == Guarantee::Settled;
+        let extents = if settled { (0..self.len()).map(widened).collect() } else { Vec::new() };
+        let mut moved = Bounds::of_errors(mesh, &errors, self.guarantee, &extents)?;
+        moved.turns = self.turns.clone();
+        Ok(moved)
     }
 
     pub(crate) fn at(&self, i: usize, centre: DVec3) -> SplitBounds {
@@ -257,7 +291,7 @@ impl Bounds {
 
     /// Bytes of those of all splits.
     pub fn bytes(&self) -> usize {
-        size_of::<Packed>() * self.of.len()
+        size_of::<Packed>() * self.of.len() + 4 * self.turns.len()
     }
 }
 

@@ -43,7 +43,12 @@ impl Cone {
             return (Vec3::Z, -1.0, 0.0);
         }
         let (sin, cos) = (steps as f32 * (std::f32::consts::FRAC_PI_2 / STEPS as f32)).sin_cos();
-        (unpack_direction(self.0).as_vec3(), cos, sin)
+        // In f32 throughout: stored cones are wider than what they are around by more than that rounds.
+        let of = |c: u32| (c & 0x3ff) as f32 * (2.0 / SIDE as f32) - 1.0;
+        let (x, y) = (of(self.0), of(self.0 >> 10));
+        let z = 1.0 - x.abs() - y.abs();
+        let fold = (-z).max(0.0);
+        (Vec3::new(x - fold.copysign(x), y - fold.copysign(y), z).normalize(), cos, sin)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Errors of all splits, from walks from the finest mesh to the base.
+//! Errors of all splits by the rule of cuts, from walks from the finest mesh to the base.
 //!
 //! Samples of the finest mesh, its vertices and quarters of its edges, lie in buckets of the faces that are nearest to them. When a split is
 //! undone, the samples around it look for their nearest face again: among those around the vertex, and from there from face to face. What is
@@ -13,10 +13,6 @@ use crate::selective::Front;
 use crate::simplify::measure::closest_on_triangle;
 use glam::DVec3;
 
-/// Samples a face of a star beyond which quarters of edges are left out, and then middles: there are enough vertices for it by then.
-const ENOUGH: usize = 10;
-/// Samples a face of a star beyond which some of its vertices are left out: half of those kept are the farthest, the others spread.
-const PLENTY: usize = 12;
 /// Faces that a sample walks over at most, beyond the star it lay on.
 const WALK: usize = 32;
 
@@ -57,6 +53,8 @@ struct Walk<'a> {
     forest: &'a Forest,
     front: Front,
     samples: Vec<Sample>,
+    /// Samples a face that are kept.
+    most: usize,
     /// The first sample on the face in each slot.
     first: Vec<u32>,
     /// For every vertex the one it has gone into, to be followed.
@@ -71,12 +69,12 @@ struct Walk<'a> {
 pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: &Front, options: &Options) -> Bounds {
     let n = forest.len();
     let finest = Finest::new(pm, forest, front);
-    let mut bounds = spheres::around(pm, forest, &finest);
+    let mut bounds = spheres::around(pm, forest, &finest, &[]);
     let Finest { positions, corners, origin, diagonal } = finest;
     let mut error = vec![0.0; n];
     // In the order of the splits; then as cuts of equal error follow on each other; then with neighbours at other levels.
     let walk = |order: &mut dyn Iterator<Item = u32>, error: Vec<f64>| {
-        let mut walk = Walk::new(pm, forest, front.clone(), &positions, &corners, error);
+        let mut walk = Walk::new(pm, forest, front.clone(), (&positions, &corners), options.samples, error);
         order.for_each(|i| walk.undo(i, origin));
         walk.error
     };
@@ -90,7 +88,7 @@ pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: &Front, opti
             let odd = (k.x + k.y + k.z).rem_euclid(2.0) == 1.0;
             if cell.is_finite() && odd == (round % 2 == 0) { FAR } else { 1.0 }
         };
-        error = walk(&mut by_error(pm, forest, |i| error[i as usize] * weight(i)).into_iter(), error);
+        error = walk(&mut by_error(forest, |i| error[i as usize] * weight(i)).into_iter(), error);
     }
     // What was raised in one order, is raised in the hierarchy.
     let margin = options.margin.max(1.0);
@@ -102,13 +100,13 @@ pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: &Front, opti
 const FAR: f64 = 1.0 / 64.0;
 
 /// All splits in an order in which they can be undone: those of the least errors first, and what depends on a split before it.
-fn by_error(pm: &ProgressiveMesh, forest: &Forest, error: impl Fn(u32) -> f64) -> Vec<u32> {
+fn by_error(forest: &Forest, error: impl Fn(u32) -> f64) -> Vec<u32> {
     let n = forest.len() as u32;
     let mut least: Vec<f64> = (0..n).map(error).collect();
     for i in (0..n).rev() {
         let e = least[i as usize];
-        for d in forest.needs(pm, i).into_iter().filter(|&d| d != NONE) {
-            let up = &mut least[d as usize];
+        for d in forest.needs.of(i) {
+            let up = &mut least[*d as usize];
             *up = up.max(e);
         }
     }
@@ -123,8 +121,8 @@ impl<'a> Walk<'a> {
         pm: &'a ProgressiveMesh,
         forest: &'a Forest,
         front: Front,
-        positions: &[DVec3],
-        corners: &[[u32; 3]],
+        (positions, corners): (&[DVec3], &[[u32; 3]]),
+        most: usize,
         error: Vec<f64>,
     ) -> Self {
         let mut samples: Vec<Sample> = Vec::with_capacity(10 * positions.len());
@@ -153,6 +151,7 @@ impl<'a> Walk<'a> {
             pm,
             forest,
             samples,
+            most,
             first,
             into: (0..positions.len() as u32).collect(),
             candidate: vec![NONE; positions.len()],
@@ -210,15 +209,16 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Leaves out samples of a star with many.
+    /// Leaves out samples of a star with many: quarters of edges, then middles, as there are enough vertices for it by then; then vertices: half of those kept are the farthest, the others
+    /// spread.
     fn thin(&self, loose: &mut Vec<u32>, faces: usize) {
         let of = |s: u32| &self.samples[s as usize];
         for kind in [Kind::Quarter, Kind::Middle] {
-            if loose.len() > ENOUGH * faces {
+            if loose.len() > self.most.saturating_mul(5 * faces) / 6 {
                 loose.retain(|&s| of(s).kind < kind);
             }
         }
-        let keep = PLENTY * faces;
+        let keep = self.most.saturating_mul(faces);
         if loose.len() > keep && keep > 0 {
             let far = keep / 2;
             loose.select_nth_unstable_by(far, |&a, &b| {

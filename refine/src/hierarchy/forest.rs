@@ -1,5 +1,6 @@
 //! What a split hangs on and what hangs on it: the vertex hierarchy and the l/r rule, as flat arrays.
 
+use super::rings::Needs;
 use crate::aif::{NONE, Positions};
 use crate::progressive::ProgressiveMesh;
 use glam::DVec3;
@@ -16,10 +17,10 @@ pub(crate) struct Forest {
     pub(crate) parent: Vec<u32>,
     /// The split that replaces each node; [`NONE`] for a leaf.
     pub(crate) split_of: Vec<u32>,
-    /// The faces, counted from the first that is not the base's, of the splits that make one only.
-    single: Vec<u32>,
     two_faces: Ranks,
     moves: Ranks,
+    /// What splits need by the rule of the hierarchy.
+    pub(crate) needs: Needs,
     /// Where splits have their attributes; empty without.
     pub(crate) rows: Vec<SplitRows>,
     /// For every row of a changed wedge, at the row, the row that the wedge had before; for others themselves. Empty without attributes.
@@ -104,21 +105,14 @@ impl Forest {
                 each.collect()
             }
         };
-        let (mut face, mut single) = (0, Vec::new());
-        for code in &pm.splits.code {
-            if !code.two_faces() {
-                single.push(face);
-            }
-            face += 1 + code.two_faces() as u32;
-        }
         Forest {
             base_vertices: n0,
             base_faces: pm.base_faces.len() as u32,
             parent,
             split_of,
-            single,
             two_faces: Ranks::new(pm.splits.code.iter().map(|c| c.two_faces())),
             moves: Ranks::new(pm.splits.code.iter().map(|c| c.moves())),
+            needs: Needs::default(),
             rows,
             row_before: pm
                 .wedges
@@ -133,23 +127,6 @@ impl Forest {
     #[inline]
     pub(crate) fn len(&self) -> usize {
         self.parent.len()
-    }
-
-    /// What split `i` depends on: the one that made the node it replaces, and those that made the faces of its cuts; [`NONE`] for the base.
-    /// O(log splits at borders).
-    #[inline]
-    pub(crate) fn needs(&self, pm: &ProgressiveMesh, i: u32) -> [u32; 3] {
-        let (l, r) = (pm.splits.left[i as usize], pm.splits.right[i as usize]);
-        let right = if r == NONE { NONE } else { self.maker_of_face(r >> 2) };
-        [self.maker(self.parent[i as usize]), self.maker_of_face(l >> 2), right]
-    }
-
-    /// The split that made a face; [`NONE`] for the base's.
-    #[inline]
-    fn maker_of_face(&self, f: u32) -> u32 {
-        let Some(f) = f.checked_sub(self.base_faces) else { return NONE };
-        // Two faces a split, but for the single ones before.
-        (f + self.single.partition_point(|&s| s < f) as u32) / 2
     }
 
     /// The split that made a node; [`NONE`] for the base's.
@@ -217,7 +194,8 @@ impl Forest {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        4 * (self.parent.len() + self.split_of.len() + self.single.len() + self.row_before.len())
+        4 * (self.parent.len() + self.split_of.len() + self.row_before.len())
+            + self.needs.bytes()
             + 12 * self.rows.len()
             + self.two_faces.bytes()
             + self.moves.bytes()
@@ -227,27 +205,6 @@ impl Forest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::progressive::build;
-    use crate::simplify::{Options, Quiet};
-
-    #[test]
-    fn what_splits_need_is_what_the_progressive_mesh_says() {
-        for name in ["terrain", "sphere", "cad"] {
-            let options = progmesh_meshes::GenerateOptions::default().with_faces(900);
-            let sample = progmesh_meshes::generate(name, &options).unwrap();
-            let input = crate::aif::MeshInput {
-                positions: Positions::from_f64(sample.positions),
-                face_sizes: sample.face_sizes,
-                corners: sample.corners,
-                ..Default::default()
-            };
-            let mesh = crate::aif::Mesh::build(input, &Default::default()).unwrap().0;
-            let pm = build(mesh, &Options::default(), &Quiet).unwrap().mesh;
-            let forest = Forest::new(&pm);
-            let own: Vec<[u32; 3]> = (0..forest.len() as u32).map(|i| forest.needs(&pm, i)).collect();
-            assert_eq!(own, pm.dependencies(), "{name}");
-        }
-    }
 
     #[test]
     fn ranks_count_what_is_set_before() {

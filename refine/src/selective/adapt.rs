@@ -122,7 +122,15 @@ impl View {
             over: false,
             whole: true,
         };
-        self.coarsen(lenses, &mut meter);
+        // First what a limit cut short: else coarsening would undo what is only there for the rest of it, frame after frame.
+        if let Some(i) = self.unfinished.take()
+            && self.still_wanted(lenses, i)
+        {
+            self.apply_with_all(i, &mut meter, &mut Vec::new(), |_, _| {});
+        }
+        if !meter.over {
+            self.coarsen(lenses, &mut meter);
+        }
         if !meter.over {
             self.refine(lenses, &mut meter);
         }
@@ -160,12 +168,52 @@ impl View {
                 self.undo(i);
                 meter.done.collapses += 1;
                 meter.since += 1;
-                let needs = self.hierarchy.forest.needs(self.hierarchy.mesh(), i);
-                stack.extend(needs.into_iter().filter(|&d| d != NONE && self.front.is_free(d)));
+                let needs = self.hierarchy.forest.needs.of(i).iter().copied();
+                stack.extend(needs.filter(|&d| self.is_free(d)));
             }
         }
         self.resume[0] = at;
         meter.whole &= whole;
+    }
+
+    /// Split `i` is not applied, and is needed.
+    fn still_wanted(&self, lenses: &[Lens], i: u32) -> bool {
+        !self.front.is_applied(i) && lenses.iter().any(|l| l.wants(&Entry::of(&self.hierarchy, i), l.tau()))
+    }
+
+    /// Applies split `i` and all it depends on, and tells what could come next; false if a limit other than that of faces cut it short.
+    fn apply_with_all(
+        &mut self,
+        i: u32,
+        meter: &mut Meter<'_>,
+        closure: &mut Vec<u32>,
+        mut next: impl FnMut(&View, u32),
+    ) -> bool {
+        closure.clear();
+        self.closure(i, closure);
+        let code = &self.hierarchy.mesh().splits.code;
+        let more: usize = closure.iter().map(|&j| 1 + code[j as usize].two_faces() as usize).sum();
+        if self.face_count() + more > meter.limits.faces {
+            meter.done.refused += 1;
+            return true;
+        }
+        for &j in &*closure {
+            if !meter.goes_on() {
+                self.unfinished = Some(i);
+                return false;
+            }
+            self.apply(j);
+            meter.done.splits += 1;
+            meter.since += 1;
+            meter.done.forced += usize::from(j != i);
+            for k in self.hierarchy.forest.nodes(j) {
+                let below = self.hierarchy.forest.split_of[k as usize];
+                if below != NONE {
+                    next(self, below);
+                }
+            }
+        }
+        true
     }
 
     /// Applies splits that are needed, until none is left.
@@ -206,34 +254,16 @@ impl View {
             if self.front.is_applied(i) {
                 continue;
             }
-            closure.clear();
-            self.closure(i, &mut closure);
-            let code = &self.hierarchy.mesh().splits.code;
-            let more: usize = closure.iter().map(|&j| 1 + code[j as usize].two_faces() as usize).sum();
-            if self.face_count() + more > meter.limits.faces {
-                meter.done.refused += 1;
-                continue;
-            }
-            for &j in &closure {
-                if !meter.goes_on() {
-                    return;
+            let goes_on = self.apply_with_all(i, meter, &mut closure, |view, next| {
+                let Some(e) = view.open.entries.get(view.place[next as usize] as usize) else { return };
+                if e.split == next && wants(e) {
+                    let b = rank(e);
+                    highest = highest.max(b);
+                    buckets[b].push(next);
                 }
-                self.apply(j);
-                meter.done.splits += 1;
-                meter.since += 1;
-                meter.done.forced += usize::from(j != i);
-                for k in self.hierarchy.forest.nodes(j) {
-                    let next = self.hierarchy.forest.split_of[k as usize];
-                    if next == NONE {
-                        continue;
-                    }
-                    let Some(e) = self.open.entries.get(self.place[next as usize] as usize) else { continue };
-                    if e.split == next && wants(e) {
-                        let b = rank(e);
-                        highest = highest.max(b);
-                        buckets[b].push(next);
-                    }
-                }
+            });
+            if !goes_on {
+                return;
             }
         }
     }

@@ -18,8 +18,6 @@ pub(crate) struct Front {
     slot_of: Vec<u32>,
     free: Vec<u32>,
     applied: Vec<u64>,
-    /// Applied splits that depend on each.
-    dependents: Vec<u8>,
     /// The node that every vertex is at, among those in the mesh.
     node: Vec<u32>,
     wedge_vertex: Vec<u32>,
@@ -66,7 +64,6 @@ impl Front {
             slot_of,
             free: Vec::new(),
             applied: vec![0; n.div_ceil(64)],
-            dependents: vec![0; n],
             node,
             wedge_vertex,
             wedge_row,
@@ -117,12 +114,6 @@ impl Front {
     /// A bit for every split: it is applied.
     pub(crate) fn applied_bits(&self) -> &[u64] {
         &self.applied
-    }
-
-    /// Nothing applied depends on split `i`, in the hierarchy or beside it.
-    #[inline]
-    pub(crate) fn is_free(&self, i: u32) -> bool {
-        self.dependents[i as usize] == 0
     }
 
     /// The node that vertex `v` is at; [`NONE`] if it is not in the mesh.
@@ -246,15 +237,12 @@ impl Front {
         (self.node[vs as usize], self.node[vu as usize]) = (old, fresh);
         self.vertices += 1;
         self.applied[k / 64] |= 1 << (k % 64);
-        for d in forest.needs(pm, i).into_iter().filter(|&d| d != NONE) {
-            self.dependents[d as usize] += 1;
-        }
         Ok(())
     }
 
-    /// Undoes split `i`, which is applied and free. O(valence).
+    /// Undoes split `i`, which is applied, and on which nothing applied depends. O(valence).
     pub(crate) fn unsplit(&mut self, pm: &ProgressiveMesh, forest: &Forest, i: u32) {
-        debug_assert!(self.is_applied(i) && self.is_free(i));
+        debug_assert!(self.is_applied(i));
         let k = i as usize;
         let (vs, code) = (pm.splits.vertex[k], pm.splits.code[k]);
         let vu = forest.base_vertices + i;
@@ -320,9 +308,6 @@ impl Front {
         }
         self.vertices -= 1;
         self.applied[k / 64] &= !(1 << (k % 64));
-        for d in forest.needs(pm, i).into_iter().filter(|&d| d != NONE) {
-            self.dependents[d as usize] -= 1;
-        }
     }
 
     /// The slots of the faces around the vertex that `start` is seen from, each once.
@@ -344,6 +329,20 @@ impl Front {
             out.push(h.face);
             at = h.turn();
         }
+    }
+
+    /// The slots of the faces around the vertex of split `i`, whose dependencies are applied: those of the fan that it opens. O(valence).
+    ///
+    /// Errors: its left cut is not there.
+    pub(crate) fn ring(&self, pm: &ProgressiveMesh, i: u32, out: &mut Vec<u32>) -> Result<(), Damage> {
+        let cut = pm.splits.left[i as usize];
+        let slot = self.slot_of.get((cut >> 2) as usize).copied().unwrap_or(NONE);
+        if slot == NONE || cut & 3 == 3 {
+            return Err(Damage::Reference { what: "split", at: i as usize, to: cut });
+        }
+        let starts = pm.splits.code[i as usize].left_starts();
+        self.star(Half { face: slot, edge: cut & 3, starts }, out);
+        Ok(())
     }
 
     /// The edge, seen from the old vertex and from the new one, between the faces that split `i` (applied) has made.
@@ -418,6 +417,6 @@ impl Front {
     pub(crate) fn bytes(&self) -> (usize, usize) {
         let shown = 28 * self.fans.corners.len() + 4 * self.free.len() + 8 * self.touched.len();
         let tables = self.slot_of.len() + self.node.len() + self.wedge_vertex.len() + self.wedge_row.len();
-        (shown, 4 * tables + self.dependents.len() + 8 * self.applied.len())
+        (shown, 4 * tables + 8 * self.applied.len())
     }
 }

@@ -41,22 +41,29 @@ impl List {
     #[inline]
     pub(super) fn push(&mut self, h: &Hierarchy, i: u32, place: &mut [u32]) {
         debug_assert_eq!(place[i as usize], NONE);
-        place[i as usize] = self.entries.len() as u32;
-        self.entries.push(Entry::of(h, i));
+        self.put(Entry::of(h, i), place);
+    }
+
+    /// Adds an entry of the other list.
+    #[inline]
+    pub(super) fn put(&mut self, e: Entry, place: &mut [u32]) {
+        place[e.split as usize] = self.entries.len() as u32;
+        self.entries.push(e);
     }
 
     /// Takes split `i` out, if it is in this list.
     #[inline]
-    pub(super) fn remove(&mut self, i: u32, place: &mut [u32]) {
+    pub(super) fn remove(&mut self, i: u32, place: &mut [u32]) -> Option<Entry> {
         let at = place[i as usize] as usize;
         if self.entries.get(at).is_none_or(|e| e.split != i) {
-            return;
+            return None;
         }
         place[i as usize] = NONE;
-        self.entries.swap_remove(at);
+        let e = self.entries.swap_remove(at);
         if let Some(moved) = self.entries.get(at) {
             place[moved.split as usize] = at as u32;
         }
+        Some(e)
     }
 
     pub(super) fn bytes(&self) -> usize {

@@ -123,7 +123,7 @@ impl TimedMorph {
         for &i in leaving.iter().rev() {
             let ends = self.ends(i);
             let there = |v: &u32| self.motions.get(v).is_none_or(|m| m.step == frames);
-            if self.drawn.front.is_free(i) && ends.iter().all(there) {
+            if self.drawn.is_free(i) && ends.iter().all(there) {
                 self.drawn.undo(i);
                 self.motions.remove(&ends[1]);
                 done.collapses += 1;
