@@ -66,7 +66,7 @@ pub struct Chunk {
     pub count: u32,
     /// The first face its splits make; of a `PAGE` the first wedge.
     pub first_face: u32,
-    /// The band: all splits of a band have errors within a factor of 4, or belong to one level of the method.
+    /// The band: its splits follow each other in error, or belong to one level of the method.
     pub band: u32,
     /// The chunk's number within its band; those of a band are subtrees side by side.
     pub subtree: u32,
