@@ -72,14 +72,25 @@ pub(crate) fn published(all: &Results, ratios: &[f64], meshes: &[&MeshLine]) -> 
     out
 }
 
-/// Lets MeshLab compute every published figure again; false if one differs. `ratios`: only these; empty for all.
-pub(crate) fn check(places: &Places, all: &[Published], ratios: &[f64], folder: &Path) -> Result<bool> {
+/// Lets MeshLab compute every published figure again; false if one differs. `ratios`: only these; empty for all. `quick`: only the meshes of a
+/// quick run.
+pub(crate) fn check(
+    places: &Places,
+    all: &[Published],
+    ratios: &[f64],
+    quick: bool,
+    folder: &Path,
+) -> Result<bool> {
     ensure!(!all.is_empty(), "nothing was published yet: bench/run --publish");
     places
         .version(find("meshlab").context("no such tool")?)
         .map_err(|e| anyhow::anyhow!("no MeshLab: {e}"))?;
     std::fs::create_dir_all(folder)?;
-    let sources = [meshes::quick(&places.env), meshes::full(&places.env)].concat();
+    let few = meshes::quick(&places.env);
+    let names: Vec<String> = few.iter().map(|s| s.name.clone()).collect();
+    // What was published is of a full run, whose generated meshes have other sizes under the same names.
+    let mut sources = [few, meshes::full(&places.env)].concat();
+    sources.retain(|s| !quick || names.contains(&s.name));
     let mut loaded: Vec<(String, Raw)> = Vec::new();
     for s in sources {
         if let Ok(raw) = s.load() {
@@ -91,7 +102,7 @@ pub(crate) fn check(places: &Places, all: &[Published], ratios: &[f64], folder: 
         "{:<12} {:>5}  {:<40} {:>20} {:>20}  verdict",
         "mesh", "kept", "method", "mean: off by", "rms: off by"
     );
-    for p in all.iter().filter(|p| ratios.is_empty() || ratios.contains(&p.ratio)) {
+    for p in wanted(all, ratios, quick.then_some(&names)) {
         let Some((_, original)) = loaded.iter().find(|l| l.0 == p.digest) else {
             println!("{:<12} is not here, or has changed", p.mesh);
             continue;
@@ -122,8 +133,24 @@ pub(crate) fn check(places: &Places, all: &[Published], ratios: &[f64], folder: 
         good &= verdict != Verdict::Differs;
         judged += usize::from(verdict != Verdict::Listed);
     }
-    ensure!(judged > 0, "nothing could be judged");
+    ensure!(
+        judged > 0,
+        "nothing could be judged: of what was published, {} figures are of {}{}",
+        wanted(all, ratios, quick.then_some(&names)).count(),
+        if quick { "the meshes of a quick run" } else { "any mesh" },
+        if ratios.is_empty() { "" } else { " at these ratios" }
+    );
     Ok(good)
+}
+
+/// What is to be checked: at these ratios (none: at all), of these meshes.
+fn wanted<'a>(
+    all: &'a [Published],
+    ratios: &'a [f64],
+    meshes: Option<&'a Vec<String>>,
+) -> impl Iterator<Item = &'a Published> {
+    let at = |p: &&Published| ratios.is_empty() || ratios.contains(&p.ratio);
+    all.iter().filter(at).filter(move |p| meshes.is_none_or(|m| m.contains(&p.mesh)))
 }
 
 fn meshlab(places: &Places, paths: &[std::path::PathBuf; 2]) -> Result<Vec<Theirs>> {
@@ -168,6 +195,25 @@ mod tests {
         assert_eq!(tools, ["quadric", "quadric-exact"]);
         assert_eq!(found[0].rms, 4e-4);
         assert!(published(&all, &[0.3], &[&mesh]).is_empty());
+    }
+
+    #[test]
+    fn a_quick_check_is_of_the_meshes_of_a_quick_run() {
+        let p = |mesh: &str, ratio| Published {
+            mesh: mesh.into(),
+            digest: String::new(),
+            ratio,
+            target: 1,
+            tool: "quadric".into(),
+            parameter: None,
+            mean: 1.0,
+            rms: 1.0,
+        };
+        let all = [p("bunny", 0.1), p("dragon", 0.1), p("bunny", 0.5)];
+        let few = vec!["bunny".to_string()];
+        assert_eq!(wanted(&all, &[], None).count(), 3);
+        assert_eq!(wanted(&all, &[], Some(&few)).count(), 2);
+        assert_eq!(wanted(&all, &[0.5], Some(&few)).count(), 1);
     }
 
     #[test]

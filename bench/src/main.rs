@@ -10,6 +10,7 @@ mod machine;
 mod measures;
 mod meshes;
 mod one;
+mod pace;
 mod page;
 mod plan;
 mod plot;
@@ -126,6 +127,9 @@ struct Terrain {
 
 #[derive(Args)]
 struct Check {
+    /// Only the meshes of a quick run.
+    #[arg(long)]
+    quick: bool,
     /// Only these ratios (10%).
     #[arg(long, value_delimiter = ',', value_name = "RATIOS")]
     only: Vec<String>,
@@ -202,7 +206,7 @@ fn command(command: Command) -> Result<ExitCode> {
             let ratios = c.only.iter().map(|w| plan::ratio(w)).collect::<Result<Vec<f64>>>()?;
             let text = std::fs::read_to_string(places.bench.join(PUBLISHED)).unwrap_or("[]".into());
             let published: Vec<check::Published> = serde_json::from_str(&text).context(PUBLISHED)?;
-            return Ok(good(check::check(&places, &published, &ratios, &out.folder)?));
+            return Ok(good(check::check(&places, &published, &ratios, c.quick, &out.folder)?));
         }
         Command::Validate(v) => {
             let (places, out) = v.places.places();

@@ -4,6 +4,7 @@ use crate::child::{Cost, Job};
 use crate::lines::{self, Line, MeshLine, Row, Runs, ToolLine};
 use crate::machine::Machine;
 use crate::measures::{self, Measures};
+use crate::pace::{self, Pace, Part};
 use crate::plan::Plan;
 use crate::raw::{Raw, digest};
 use crate::tools::{Places, Tool};
@@ -73,23 +74,26 @@ pub(crate) fn run(plan: &Plan, places: &Places, out: &Out, resume: bool) -> Resu
         versions.push((tool.id, version));
     }
     let old = lines::read(&out.results())?;
+    let no_results = old.is_empty();
+    let before: Vec<Row> =
+        old.into_iter().filter_map(|l| if let Line::Run(r) = l { Some(*r) } else { None }).collect();
     let mut kept: Vec<Row> = Vec::new();
     if resume {
         let current = |r: &Row| versions.iter().any(|v| v.0 == r.tool && v.1.as_ref() == Ok(&r.version));
-        let rows = old.into_iter().filter_map(|l| if let Line::Run(r) = l { Some(*r) } else { None });
-        kept.extend(rows.filter(|r| current(r) && meshes.iter().any(|m| m.line.digest == r.digest)));
+        let fits = |r: &&Row| current(r) && meshes.iter().any(|m| m.line.digest == r.digest);
+        kept.extend(before.iter().filter(fits).cloned());
         eprintln!("{} rows kept", kept.len());
-    } else if !old.is_empty() {
-        let before = out.folder.join("results.old.jsonl");
-        std::fs::rename(out.results(), &before).with_context(|| before.display().to_string())?;
+    } else if !no_results {
+        let aside = out.folder.join("results.old.jsonl");
+        std::fs::rename(out.results(), &aside).with_context(|| aside.display().to_string())?;
     }
     head.extend(kept.iter().map(|r| Line::Run(Box::new(r.clone()))));
     lines::write(&out.results(), &head)?;
 
-    let (start, total) = (Instant::now(), meshes.len() * plan.ratios.len());
+    // What there is to do, in order.
+    let mut parts = Vec::new();
     for (m, mesh) in meshes.iter().enumerate() {
-        let mut original = None;
-        for (i, &ratio) in plan.ratios.iter().enumerate() {
+        for &ratio in &plan.ratios {
             let row = |tool: &Tool, threads, version: &str| Row {
                 mesh: mesh.line.mesh.clone(),
                 digest: mesh.line.digest.clone(),
@@ -109,24 +113,42 @@ pub(crate) fn run(plan: &Plan, places: &Places, out: &Out, resume: bool) -> Resu
                     group.push(Entrant { tool, row, costs: vec![], digest: String::new() });
                 }
             }
-            if group.is_empty() {
-                continue;
-            }
-            let done = m * plan.ratios.len() + i;
-            eprintln!(
-                "[{done}/{total}, {:.0} s] {} to {} %",
-                start.elapsed().as_secs_f64(),
-                mesh.line.mesh,
-                100.0 * ratio
-            );
-            let original = match &mut original {
-                Some(o) => o,
-                none => none.insert(measures::surface(&Raw::read(&mesh.path)?)?),
-            };
-            for row in measure_group(group, plan, places, mesh, original, &out.folder)? {
-                lines::append(&out.results(), &Line::Run(Box::new(row)))?;
+            if !group.is_empty() {
+                parts.push((m, ratio, group));
             }
         }
+    }
+    let todo: Vec<Part> = parts
+        .iter()
+        .map(|(m, _, group)| Part {
+            tools: group.iter().map(|e| e.tool).collect(),
+            triangles: meshes[*m].line.triangles,
+        })
+        .collect();
+    let mut pace = Pace::new(&todo, plan.repeat, &before);
+    let (start, total) = (Instant::now(), parts.len());
+    if total > 0 {
+        eprintln!("{total} parts: {}", pace::words(pace.left()));
+    }
+    let mut original: Option<(usize, Surface)> = None;
+    for (done, (m, ratio, group)) in parts.into_iter().enumerate() {
+        let mesh = &meshes[m];
+        eprintln!(
+            "[{done}/{total}, {:.0} s, {} left] {} to {} %",
+            start.elapsed().as_secs_f64(),
+            pace::words(pace.left()),
+            mesh.line.mesh,
+            100.0 * ratio
+        );
+        let now = Instant::now();
+        let original = match original.take().filter(|o| o.0 == m) {
+            Some(same) => &original.insert(same).1,
+            None => &original.insert((m, measures::surface(&Raw::read(&mesh.path)?)?)).1,
+        };
+        for row in measure_group(group, plan, places, mesh, original, &out.folder)? {
+            lines::append(&out.results(), &Line::Run(Box::new(row)))?;
+        }
+        pace.add(now.elapsed().as_secs_f64());
     }
     eprintln!("measured in {:.0} s", start.elapsed().as_secs_f64());
     Ok(())
