@@ -53,6 +53,15 @@ impl Bits {
         self.ones
     }
 
+    /// The set bits, ascending. O(n / 64) and the bits.
+    pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
+        self.words
+            .iter()
+            .enumerate()
+            .filter(|w| *w.1 != 0)
+            .flat_map(|(i, &w)| (0..64).filter(move |b| w >> b & 1 == 1).map(move |b| 64 * i + b))
+    }
+
     /// True if the count is that of the bits, and none is set at `n` or beyond.
     pub(crate) fn is_consistent(&self, n: usize) -> bool {
         let ones: usize = self.words.iter().map(|w| w.count_ones() as usize).sum();
@@ -78,6 +87,7 @@ mod tests {
         b.set(3);
         b.set(200);
         assert_eq!((b.count(), b.get(3), b.get(4), b.get(200), b.get(10_000)), (2, true, false, true, false));
+        assert!(b.iter().eq([3, 200]));
         b.clear(3);
         b.clear(3);
         assert_eq!((b.count(), b.get(3)), (1, false));

@@ -40,8 +40,8 @@ pub(crate) fn simplify_all(
     let total: usize = before.iter().map(|b| b.triangles).sum();
     let target = target(options, total);
     let mut sources = Vec::with_capacity(meshes.len());
-    for (mesh, &scale) in meshes.iter_mut().zip(scales) {
-        sources.push(Source::new(mesh, options, scale)?);
+    for (i, (mesh, &scale)) in meshes.iter_mut().zip(scales).enumerate() {
+        sources.push(Source::new(mesh, &options.of_mesh(i), scale)?);
     }
     let cut: Vec<usize> = sources.iter().map(|s| s.cut).collect();
     let isolated: Vec<usize> = sources.iter().map(Source::isolated).collect();

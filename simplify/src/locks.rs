@@ -2,6 +2,19 @@
 
 use crate::options::Options;
 use progmesh_aif::{Bits, Mesh};
+use std::borrow::Cow;
+
+impl Options {
+    /// Those of mesh `i` of several: what is locked there is locked by number.
+    pub(crate) fn of_mesh(&self, i: usize) -> Cow<'_, Options> {
+        let Some(own) = self.locked_by_mesh.get(i).filter(|l| l.count() > 0) else {
+            return Cow::Borrowed(self);
+        };
+        let mut options = Options { locked_by_mesh: Vec::new(), ..self.clone() };
+        own.iter().for_each(|v| options.locked_vertices.set(v));
+        Cow::Owned(options)
+    }
+}
 
 /// The vertices that are locked by number, material or group. O(n) if faces are locked, else O(1) but for the copy.
 pub(crate) fn locked_vertices(mesh: &Mesh, options: &Options) -> Bits {

@@ -144,8 +144,8 @@ fn run_engines(
     }
     // Nothing may be changed before all options are known to be good.
     let mut engines = Vec::with_capacity(meshes.len());
-    for (mesh, &scale) in meshes.iter_mut().zip(scales) {
-        let mut engine = Engine::new(mesh, options, epsilon, scale)?;
+    for (i, (mesh, &scale)) in meshes.iter_mut().zip(scales).enumerate() {
+        let mut engine = Engine::new(mesh, &options.of_mesh(i), epsilon, scale)?;
         engine.log = logged.then(CollapseLog::default);
         engines.push(engine);
     }

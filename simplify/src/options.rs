@@ -79,6 +79,8 @@ pub struct Options {
     pub keep_vertices: bool,
     /// Vertices that neither move nor go, by slot; empty for none.
     pub locked_vertices: Bits,
+    /// [`crate::simplify_all`]: further vertices of each mesh that neither move nor go, by slot; empty, or shorter than the meshes are many, for none.
+    pub locked_by_mesh: Vec<Bits>,
     /// Faces of these materials keep all their vertices.
     pub locked_materials: Vec<u32>,
     /// Faces of these groups keep all their vertices.

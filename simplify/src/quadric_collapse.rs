@@ -70,7 +70,8 @@ fn run_all(
     control: &dyn Control,
 ) -> Result<(Stop, Vec<Done>), SimplifyError> {
     let mut collapsers = Vec::with_capacity(meshes.len());
-    for (mesh, &scale) in meshes.iter_mut().zip(scales) {
+    for (i, (mesh, &scale)) in meshes.iter_mut().zip(scales).enumerate() {
+        let options = &options.of_mesh(i);
         let mut collapser = Collapser::new(Work::new(mesh, options)?, options, scale);
         collapser.log = logged.then(CollapseLog::default);
         collapsers.push(collapser);
