@@ -2,7 +2,7 @@
 //!
 //! This is what `progmesh simplify` does between reading and writing; on a mesh of your own, use [`crate::simplify`] directly.
 
-use crate::aif::{BuildError, BuildOptions, BuildReport, CheckError, Mesh, MeshInput, Weld};
+use crate::aif::{Bits, BuildError, BuildOptions, BuildReport, CheckError, Mesh, MeshInput, Weld};
 use crate::compare::{CompareError, Flattened};
 use crate::normals::{self, Normals};
 use crate::scene::{Scene, SceneMesh};
@@ -238,7 +238,17 @@ fn measured(
 }
 
 /// One run of the method, unmeasured.
-fn run(mut scene: Scene, job: &Job, control: &dyn Control) -> Result<(Scene, Summary), JobError> {
+fn run(scene: Scene, job: &Job, control: &dyn Control) -> Result<(Scene, Summary), JobError> {
+    run_keeping(scene, job, &[], control)
+}
+
+/// The same, with vertices that stay where they are: of each mesh, as the scene numbers them. Not for `per_mesh`.
+fn run_keeping(
+    mut scene: Scene,
+    job: &Job,
+    kept: &[Bits],
+    control: &dyn Control,
+) -> Result<(Scene, Summary), JobError> {
     let mut options = job.options.clone();
     let mut warnings = Vec::new();
     let start = Instant::now();
@@ -266,6 +276,15 @@ fn run(mut scene: Scene, job: &Job, control: &dyn Control) -> Result<(Scene, Sum
         let (mesh, report) = Mesh::build(input, &BuildOptions::with_weld(job.weld))
             .map_err(|source| JobError::Build { mesh: label.clone(), source })?;
         changes.add(&label, &report, job.weld != Weld::No);
+        if let Some(kept) = kept.get(i) {
+            let mut locked = Bits::default();
+            let of = |v: usize| match &report.vertex_map {
+                Some(map) => map.get(v).map(|&v| v as usize),
+                None => Some(v),
+            };
+            kept.iter().filter_map(of).for_each(|v| locked.set(v));
+            options.locked_by_mesh.push(locked);
+        }
         meshes.push(mesh);
     }
     warnings.extend(changes.warnings());

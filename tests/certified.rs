@@ -1,11 +1,13 @@
 //! `Job::certified` on meshes of several shapes: what is proven holds for what is written, with no more triangles than a plain search finds.
 
+use glam::{DMat4, DQuat, DVec3};
+use progmesh::aif::{Channel, Semantic, Wedges, Weld};
 use progmesh::compare::Flattened;
 use progmesh::io::{self, EncodeOptions, Format, NoSide};
 use progmesh::meshes::{GenerateOptions, generate};
 use progmesh::pipeline::{Job, Summary, simplify_scene};
 use progmesh::samples;
-use progmesh::scene::Scene;
+use progmesh::scene::{Node, Scene};
 use progmesh::simplify::measure::{CertifyOptions, certify};
 use progmesh::simplify::{MaxError, Method, Placement, Quiet};
 
@@ -106,17 +108,75 @@ fn what_is_written_in_single_precision_is_proven_too() {
     assert!(result.unique_triangles() < scene.unique_triangles());
 }
 
-#[test]
-fn one_bad_place_does_not_cost_the_whole_mesh() {
-    // A sphere with a fin: a folded sheet, thinner than what is allowed but far longer. Plain runs lose it.
-    let mut scene = sample("sphere", 5000);
+/// A sphere with a fin: a folded sheet, thinner than what is allowed but far longer. Plain runs lose it.
+fn finned(faces: usize) -> Scene {
+    let mut scene = sample("sphere", faces);
     let geometry = &mut scene.meshes[0].geometry;
     let far = geometry.positions.get(17) * 1.06;
     geometry.positions.set(17, far);
-    let job = certified(2e-3);
-    let (result, summary) = done(&scene, &job);
-    let plain = bisected(&scene, &job, summary.certified.unwrap().bound);
-    assert!(result.unique_triangles() as f64 <= 1.1 * plain as f64, "{} {plain}", result.unique_triangles());
+    scene
+}
+
+/// What is proven, with no more triangles than plain runs find. That vertices are kept, `pipeline::certified` tests.
+fn assert_no_worse(scene: &Scene, job: &Job) {
+    let (result, summary) = done(scene, job);
+    let plain = bisected(scene, job, summary.certified.unwrap().bound);
+    let n = result.unique_triangles();
+    assert!(n as f64 <= 1.1 * plain as f64, "{n}, {plain} by bisecting, of {}", scene.unique_triangles());
+}
+
+#[test]
+fn one_bad_place_does_not_cost_the_whole_mesh() {
+    assert_no_worse(&finned(5000), &certified(2e-3));
+}
+
+#[test]
+fn nor_in_a_scene_of_several_meshes_that_stand_anywhere() {
+    let mut scene = finned(1000);
+    scene.meshes.insert(0, sample("torus", 500).meshes.remove(0));
+    let node = |mesh, place: DVec3| {
+        // Mirrored and turned: vertices are found by their numbers, not by their places.
+        let turned = DQuat::from_rotation_y(0.7);
+        let matrix = DMat4::from_scale_rotation_translation(DVec3::new(-1.0, 1.0, 1.0), turned, place);
+        Node { mesh: Some(mesh), transform: matrix, name: None, children: vec![] }
+    };
+    scene.nodes = vec![node(0, DVec3::X * 4.0), node(1, DVec3::ZERO), node(1, DVec3::Y * 3.0)];
+    scene.roots = vec![0, 1, 2];
+    assert_no_worse(&scene, &certified(1e-3));
+}
+
+#[test]
+fn nor_where_vertices_are_welded() {
+    let mut scene = finned(1200);
+    let geometry = &mut scene.meshes[0].geometry;
+    // Every triangle has vertices of its own.
+    geometry.positions = geometry.positions.gather(&geometry.corners);
+    geometry.corners = (0..geometry.corners.len() as u32).collect();
+    geometry.wedges = None;
+    let mut job = certified(2e-3);
+    job.weld = Weld::BitEqual;
+    assert_no_worse(&scene, &job);
+}
+
+#[test]
+fn what_is_kept_goes_with_weights_locks_and_refitting() {
+    let mut scene = finned(1200);
+    let geometry = &mut scene.meshes[0].geometry;
+    let channels = ["weight", "lock"].map(|n| Channel::new(Semantic::Custom(n.into()), 1));
+    let mut wedges = Wedges::new(channels.to_vec()).unwrap();
+    let locked: Vec<DVec3> = geometry.positions.iter().step_by(100).collect();
+    for (v, p) in geometry.positions.iter().enumerate() {
+        wedges.push(&[if p.z > 0.0 { 4.0 } else { 1.0 }, f32::from(v % 100 == 0)], 0b11);
+    }
+    wedges.corner = geometry.corners.clone();
+    geometry.wedges = Some(wedges);
+    let mut job = certified(2e-3);
+    (job.weights_property, job.lock_property) = (Some("weight".into()), Some("lock".into()));
+    job.options.refit = Some(3);
+    assert_no_worse(&scene, &job);
+    let (result, _) = simplify_scene(scene, &job, &Quiet).unwrap();
+    let there: Vec<DVec3> = result.meshes[0].geometry.positions.iter().collect();
+    assert!(locked.iter().all(|p| there.contains(p)));
 }
 
 #[test]

@@ -270,6 +270,11 @@ fn merge(instances: &[Instance<'_>]) -> (MeshInput, Vec<Group>) {
     (out, groups)
 }
 
+/// Where the vertices of [`flatten`]'s mesh are from: each instance's, one after the other, as the mesh and the number of its vertices.
+pub(crate) fn origins(scene: &Scene) -> Vec<(usize, usize)> {
+    instances(scene).iter().map(|i| (i.index, i.mesh.geometry.positions.len())).collect()
+}
+
 /// A name for an instance that no other has.
 fn unique(instance: &Instance<'_>, names: &mut BTreeSet<String>) -> String {
     let stem = instance

@@ -1,8 +1,9 @@
 //! As few triangles as a proven bound of the distance allows: a search over runs of the method.
 
-use super::{Job, JobError, Part, Proven, Summary, run, scale};
-use crate::aif::{Bits, Positions, Weld};
+use super::{Job, JobError, Part, Proven, Summary, run, run_keeping, scale};
+use crate::aif::{Bits, Positions};
 use crate::compare::{CompareError, Flattened};
+use crate::io::flatten::origins;
 use crate::scene::Scene;
 use crate::simplify::measure::{CertifyOptions, MeasureError, Place, exceeding};
 use crate::simplify::{Control, Stop};
@@ -53,9 +54,6 @@ pub(super) fn simplify(
     let bound = job.options.max_error.ok_or(JobError::NoBound)?;
     let bound = if bound.relative { bound.value * scale::world_diagonal(&scene) } else { bound.value };
     let all = scene.unique_triangles();
-    // Vertices of the scene are those of its mesh only where there is one, which is not welded.
-    let vertices = scene.meshes.first().map_or(0, |m| m.geometry.positions.len());
-    let may_keep = scene.meshes.len() == 1 && vertices == input.positions.len() && job.weld == Weld::No;
     // What is written in single precision moves by that much.
     let exact = matches!(input.positions, Positions::F32(_));
     let (lo, hi) = input.surface.bounds();
@@ -68,8 +66,7 @@ pub(super) fn simplify(
         control,
         bound: bound - rounding.min(bound),
         rounding,
-        kept: Bits::new(if may_keep { vertices } else { 0 }),
-        may_keep,
+        kept: Kept::of(&scene),
         fails_plain: 0,
         runs: 0,
         seconds: [0.0; 3],
@@ -142,8 +139,7 @@ struct Search<'a> {
     bound: f64,
     rounding: f64,
     /// Vertices that runs do not touch.
-    kept: Bits,
-    may_keep: bool,
+    kept: Kept,
     /// The greatest number of triangles that does not pass while no vertex is kept.
     fails_plain: usize,
     runs: usize,
@@ -172,7 +168,7 @@ struct Verdict {
 impl Search<'_> {
     /// A run to this many triangles, or by the estimate, and again where keeping a few vertices may help; `None` when cancelled.
     fn probe(&mut self, triangles: Option<usize>) -> Result<(Option<usize>, Option<Probe>), JobError> {
-        let mut mends = if self.may_keep { MENDS } else { 0 };
+        let mut mends = MENDS;
         loop {
             let Some((scene, summary)) = self.run_once(triangles)? else { return Ok((triangles, None)) };
             let now = Instant::now();
@@ -187,7 +183,7 @@ impl Search<'_> {
                 self.fails_plain = self.fails_plain.max(summary.triangles_out);
             }
             if upper.is_none() && !far.is_empty() {
-                far.iter().for_each(|&v| self.kept.set(v as usize));
+                far.iter().for_each(|&v| self.kept.add(v));
                 if mends > 0 {
                     mends -= 1;
                     continue;
@@ -217,17 +213,10 @@ impl Search<'_> {
             }
             _ => None,
         };
-        if self.kept.count() > 0 {
-            let given = &job.options.locked_vertices;
-            let mut locked = self.kept.clone();
-            let also = (0..self.input.positions.len()).filter(|&v| given.get(v));
-            also.for_each(|v| locked.set(v));
-            job.options.locked_vertices = locked;
-        }
         self.runs += 1;
         let [start, share] = self.share();
         let part = Part::new(self.control, start, 0.5 * share);
-        let (scene, summary) = run(self.scene.clone(), &job, &part)?;
+        let (scene, summary) = run_keeping(self.scene.clone(), &job, &self.kept.of_mesh, &part)?;
         self.seconds[0] += summary.build_seconds;
         self.seconds[1] += summary.simplify_seconds;
         Ok((summary.stop != Stop::Cancelled).then_some((scene, summary)))
@@ -235,9 +224,8 @@ impl Search<'_> {
 
     /// How many more places of a result of so many triangles may be kept.
     fn spare(&self, triangles: usize) -> usize {
-        let all = if self.may_keep { triangles / KEPT + SPARE } else { 0 };
         // A place in the middle of a triangle takes its three corners.
-        all.saturating_sub(self.kept.count()) / 3
+        (triangles / KEPT + SPARE).saturating_sub(self.kept.count()) / 3
     }
 
     fn judge(&self, result: &Scene, control: &dyn Control) -> Result<Verdict, CompareError> {
@@ -294,7 +282,7 @@ impl Search<'_> {
         let Some(corners) = self.input.triangles.get(triangle as usize) else { return };
         let at =
             |v: &u32| self.input.positions.get(*v as usize).distance(place.point) <= 1e-9 * place.distance;
-        let new = |v: &u32| !self.kept.get(*v as usize);
+        let new = |v: &u32| !self.kept.has(*v);
         match corners.iter().find(|v| at(v) && new(v)) {
             Some(&v) => found.push(v),
             None => found.extend(corners.iter().filter(|v| new(v))),
@@ -313,6 +301,49 @@ impl Search<'_> {
         summary.warnings = vec!["no simpler mesh passes: the result is the input as it was".into()];
         (summary.stop, summary.estimate) = (Stop::Error, 0.0);
         Ok((self.scene.clone(), summary))
+    }
+}
+
+/// Vertices of a scene's meshes, named by the vertices of the flattened scene.
+struct Kept {
+    /// The first vertex of every instance, and its mesh; ascending.
+    instances: Vec<(u32, usize)>,
+    /// Of each mesh.
+    of_mesh: Vec<Bits>,
+}
+
+impl Kept {
+    /// None yet.
+    fn of(scene: &Scene) -> Kept {
+        let mut first = 0;
+        let mut begin = |(mesh, vertices): (usize, usize)| {
+            first += vertices as u32;
+            (first - vertices as u32, mesh)
+        };
+        let instances = origins(scene).into_iter().map(&mut begin).collect();
+        let of_mesh = scene.meshes.iter().map(|m| Bits::new(m.geometry.positions.len())).collect();
+        Kept { instances, of_mesh }
+    }
+
+    /// The mesh of a flattened vertex, and its number there.
+    fn origin(&self, v: u32) -> Option<(usize, usize)> {
+        let i = self.instances.partition_point(|i| i.0 <= v).checked_sub(1)?;
+        let (first, mesh) = self.instances[i];
+        Some((mesh, (v - first) as usize))
+    }
+
+    fn has(&self, v: u32) -> bool {
+        self.origin(v).is_some_and(|(mesh, v)| self.of_mesh[mesh].get(v))
+    }
+
+    fn add(&mut self, v: u32) {
+        if let Some((mesh, v)) = self.origin(v) {
+            self.of_mesh[mesh].set(v);
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.of_mesh.iter().map(Bits::count).sum()
     }
 }
 
@@ -387,5 +418,90 @@ impl Range {
         };
         let (least, most) = (self.low.map_or(self.floor, |l| l + 1), self.high.map_or(self.all, |h| h - 1));
         Some((next.round() as usize).clamp(self.floor.max(least.min(most)), most.max(self.floor)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aif::Weld;
+    use crate::meshes::{GenerateOptions, generate};
+    use crate::scene::{Node, SceneMesh};
+    use crate::simplify::{Method, Placement, Quiet};
+    use glam::{DMat4, DVec3};
+
+    fn mesh(name: &str) -> SceneMesh {
+        let sample = generate(name, &GenerateOptions::default().with_faces(900)).unwrap();
+        let mut mesh = crate::samples::scene(sample, name).meshes.remove(0);
+        // Every triangle has vertices of its own, as in STL.
+        let g = &mut mesh.geometry;
+        g.positions = g.positions.gather(&g.corners);
+        g.corners = (0..g.corners.len() as u32).collect();
+        (g.wedges, g.wires) = (None, vec![]);
+        mesh
+    }
+
+    #[test]
+    fn kept_vertices_stay_in_every_mesh_by_every_method() {
+        let mut scene = Scene::from_mesh(mesh("torus"));
+        scene.meshes.push(mesh("sphere"));
+        (scene.nodes, scene.roots) = (vec![], vec![]);
+        let mut kept = Kept::of(&scene);
+        // Of the torus every 97th, of the sphere every 61st, by their numbers in the flattened scene.
+        let torus = scene.meshes[0].geometry.positions.len() as u32;
+        let sphere = scene.meshes[1].geometry.positions.len() as u32;
+        (0..torus).step_by(97).for_each(|v| kept.add(v));
+        (torus..torus + sphere).step_by(61).for_each(|v| kept.add(v));
+        for (method, placement, refit) in [
+            (Method::Quadric, Placement::Optimal, 3),
+            (Method::Quadric, Placement::Endpoint, 0),
+            (Method::Nsa, Placement::Midpoint, 0),
+            (Method::Cluster, Placement::Optimal, 0),
+        ] {
+            let mut job = Job { weld: Weld::BitEqual, ..Job::default() };
+            (job.options.method, job.options.placement) = (method, Some(placement));
+            (job.options.refit, job.options.epsilon) = (Some(refit), (method == Method::Nsa).then_some(60.0));
+            job.options.ratio = Some(0.2);
+            let (result, _) = run_keeping(scene.clone(), &job, &kept.of_mesh, &Quiet).unwrap();
+            let (plain, _) = run(scene.clone(), &job, &Quiet).unwrap();
+            for (m, of) in kept.of_mesh.iter().enumerate() {
+                let at = |s: &Scene| s.meshes[m].geometry.positions.iter().collect::<Vec<DVec3>>();
+                let (before, after, without) = (at(&scene), at(&result), at(&plain));
+                assert!(of.count() > 10);
+                let missing = |there: &[DVec3]| of.iter().filter(|&v| !there.contains(&before[v])).count();
+                // A cluster may lose all triangles around a vertex that stays.
+                let allowed = if method == Method::Cluster { of.count() / 4 } else { 0 };
+                let which = format!("{method:?} {placement:?}, mesh {m}");
+                assert!(missing(&after) <= allowed, "{which}: {} are gone", missing(&after));
+                assert!(missing(&without) > allowed, "{which}: kept anyway");
+            }
+        }
+    }
+
+    #[test]
+    fn vertices_of_instances_are_those_of_their_mesh() {
+        let mut scene = Scene::from_mesh(mesh("torus"));
+        scene.meshes.push(mesh("sphere"));
+        let [torus, sphere] = [0, 1].map(|m: usize| scene.meshes[m].geometry.positions.len() as u32);
+        let node = |mesh, x: f64| Node {
+            name: None,
+            transform: DMat4::from_translation(DVec3::X * x),
+            mesh: Some(mesh),
+            children: vec![],
+        };
+        scene.nodes = vec![node(1, 0.0), node(0, 5.0), node(1, 9.0)];
+        scene.roots = vec![0, 1, 2];
+        let mut kept = Kept::of(&scene);
+        let of = |v| kept.origin(v);
+        assert_eq!((of(0), of(sphere - 1)), (Some((1, 0)), Some((1, sphere as usize - 1))));
+        assert_eq!((of(sphere), of(sphere + torus + 2)), (Some((0, 0)), Some((1, 2))));
+        kept.add(sphere + torus + 2);
+        assert!(kept.has(2) && !kept.has(sphere + 2));
+        assert_eq!(kept.count(), 1);
+        // What is flattened has them there.
+        let flat = Flattened::of(&scene).unwrap();
+        let home = scene.meshes[1].geometry.positions.get(2);
+        let there = flat.positions.get((sphere + torus + 2) as usize);
+        assert!(there.distance(home + DVec3::X * 9.0) < 1e-5);
     }
 }
