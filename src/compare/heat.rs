@@ -192,8 +192,17 @@ pub fn heat_page(pair: &Pair<'_>, tables: &[Table]) -> Page {
     tables.iter().for_each(|t| page.table(t));
     page.heading("From six sides");
     let sides = ["right (+x)", "left (-x)", "above (+y)", "below (-y)", "the front (+z)", "behind (-z)"];
-    for (view, side) in View::axes(pair.bounds(), PANEL.1).into_iter().zip(sides) {
-        page.picture(&pair.panels(&view.tightened_to(&pair.drawn)), &format!("from {side}"));
+    let draw = |view: View| pair.panels(&view.tightened_to(&pair.drawn));
+    let views = View::axes(pair.bounds(), PANEL.1);
+    #[cfg(feature = "parallel")]
+    let pictures: Vec<Picture> = {
+        use rayon::prelude::*;
+        views.into_par_iter().map(draw).collect()
+    };
+    #[cfg(not(feature = "parallel"))]
+    let pictures: Vec<Picture> = views.into_iter().map(draw).collect();
+    for (picture, side) in pictures.iter().zip(sides) {
+        page.picture(picture, &format!("from {side}"));
     }
     page
 }

@@ -2,7 +2,7 @@
 
 use super::colormap::{heat_bytes, heat_color};
 use super::picture::Picture;
-use super::render::{Style, render, render_painted};
+use super::render::{Style, render, render_both};
 use super::surface::Surface;
 use super::table::short;
 use super::view::View;
@@ -78,7 +78,7 @@ pub fn heat_panels(
     field: impl Fn(&[DVec3]) -> Vec<f64> + Sync,
 ) -> Picture {
     let style = Style::default();
-    let heat = render_painted(a, view, &style, |points| {
+    let [plain, heat] = render_both(a, view, &style, |points| {
         field(points).into_iter().map(|v| drawn(heat_color(scale.part(v)))).collect()
     });
     let count = |s: &Surface| match s.triangle_count() {
@@ -88,7 +88,7 @@ pub fn heat_panels(
     let legend = legend(scale, view.height());
     Picture::beside(
         &[
-            titled(&render(a, view, &style), titles.a, &count(a)),
+            titled(&plain, titles.a, &count(a)),
             titled(&render(b, view, &style), titles.b, &count(b)),
             titled(&heat, titles.heat, &scale.unit),
             titled(&legend, "", ""),

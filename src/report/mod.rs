@@ -31,7 +31,7 @@ pub use page::Page;
 pub(crate) use page::escaped;
 pub use picture::Picture;
 pub use relief::relief;
-pub use render::{Mask, Shading, Style, render, render_painted, silhouette};
+pub use render::{Mask, Shading, Style, render, render_both, render_painted, silhouette};
 pub use surface::{Surface, SurfaceError};
 pub use table::{Table, short};
 pub use view::{Projection, View};

@@ -55,11 +55,10 @@ const LINE_SHADE: f64 = 0.15;
 pub fn render(surface: &Surface, view: &View, style: &Style) -> Picture {
     let (large, samples) = enlarged(view, style);
     let mut light = vec![style.background; large.width() as usize * large.height() as usize];
-    draw(surface, &large, style, [AMBIENT, LAMP], |f, triangle, shade| {
-        let color = surface.palette[surface.triangles[triangle].color as usize];
-        light[f.index] = color.map(|c| (c as f64 * shade) as f32);
+    draw(surface, &large, style, |f, triangle, lit| {
+        light[f.index] = lit.color(surface, triangle);
     });
-    developed(&light, view, samples)
+    developed(&light, view, samples, style.background)
 }
 
 /// Draws the surface in colours that depend on the place: `paint` gets points of the surface in the world, and returns linear colours, 0 to
@@ -72,34 +71,51 @@ pub fn render_painted(
     style: &Style,
     paint: impl Fn(&[DVec3]) -> Vec<[f32; 3]> + Sync,
 ) -> Picture {
-    let (large, samples) = enlarged(view, style);
-    // Of every sample: how light it is, and where.
-    let mut seen: Vec<Option<(f32, DVec3)>> = vec![None; large.width() as usize * large.height() as usize];
-    draw(surface, &large, style, [FLAT_AMBIENT, FLAT_LAMP], |f, _, shade| {
-        seen[f.index] = Some((shade as f32, f.point))
-    });
+    let [_, painted] = render_both(surface, view, style, paint);
+    painted
+}
 
-    let across = large.width() as usize;
-    let n = samples as usize;
-    let pixels = (0..view.width() as usize * view.height() as usize).map(|i| {
-        let (x, y) = (i % view.width() as usize, i / view.width() as usize);
-        (0..n * n).map(move |k| (y * n + k / n) * across + x * n + k % n)
+/// What [`render`] and [`render_painted`] draw, for less than both.
+pub fn render_both(
+    surface: &Surface,
+    view: &View,
+    style: &Style,
+    paint: impl Fn(&[DVec3]) -> Vec<[f32; 3]> + Sync,
+) -> [Picture; 2] {
+    let (large, samples) = enlarged(view, style);
+    let mut light = vec![style.background; large.width() as usize * large.height() as usize];
+    // Of every sample: how light it is where colours have a meaning, and where.
+    let mut seen: Vec<Option<(f32, DVec3)>> = vec![None; light.len()];
+    draw(surface, &large, style, |f, triangle, lit| {
+        light[f.index] = lit.color(surface, triangle);
+        seen[f.index] = Some((lit.shade(FLAT_AMBIENT, FLAT_LAMP) as f32, f.point));
     });
+    let plain = developed(&light, view, samples, style.background);
+
+    let (across, n) = (large.width() as usize, samples as usize);
     // The first sample that is covered stands for the pixel.
-    let first: Vec<Option<DVec3>> =
-        pixels.clone().map(|mut at| at.find_map(|s| seen[s].map(|s| s.1))).collect();
-    let points: Vec<DVec3> = first.iter().flatten().copied().collect();
+    let mut points = Vec::new();
+    let pixels =
+        || (0..large.height() as usize).step_by(n).flat_map(|y| (0..across).step_by(n).map(move |x| (x, y)));
+    let first = |(x, y): (usize, usize)| {
+        (0..n).find_map(|dy| seen[(y + dy) * across + x..][..n].iter().find_map(|s| s.map(|s| s.1)))
+    };
+    points.extend(pixels().filter_map(first));
     let mut colors = in_chunks(&points, &paint).into_iter();
-    let mut light = vec![style.background; seen.len()];
-    for (at, first) in pixels.zip(first) {
-        let Some(color) = first.and_then(|_| colors.next()) else { continue };
-        for s in at {
-            if let Some((shade, _)) = seen[s] {
-                light[s] = color.map(|c| c * shade);
+    for (x, y) in pixels() {
+        if first((x, y)).is_none() {
+            continue;
+        }
+        let Some(color) = colors.next() else { break };
+        for row in (y..y + n).map(|y| y * across + x) {
+            for (l, s) in light[row..row + n].iter_mut().zip(&seen[row..row + n]) {
+                if let Some((shade, _)) = s {
+                    *l = color.map(|c| c * shade);
+                }
             }
         }
     }
-    developed(&light, view, samples)
+    [plain, developed(&light, view, samples, style.background)]
 }
 
 /// Points that are painted at a time.
@@ -124,14 +140,29 @@ fn enlarged(view: &View, style: &Style) -> (View, u32) {
     (large, samples)
 }
 
-/// Calls `set` for samples that are nearer than what was there: with the triangle, and the light it gives back.
-fn draw(
-    surface: &Surface,
-    large: &View,
-    style: &Style,
-    [ambient, lamp]: [f64; 2],
-    mut set: impl FnMut(&Fragment, usize, f64),
-) {
+/// The light that a sample gets.
+#[derive(Clone, Copy)]
+struct Lit {
+    /// From the lamp, 0 to 1.
+    lamp: f64,
+    /// What is left of all.
+    left: f64,
+}
+
+impl Lit {
+    fn shade(self, ambient: f64, lamp: f64) -> f64 {
+        (ambient + lamp * self.lamp) * self.left
+    }
+
+    /// The colour of a triangle in this light.
+    fn color(self, surface: &Surface, triangle: usize) -> [f32; 3] {
+        let shade = self.shade(AMBIENT, LAMP);
+        surface.palette[surface.triangles[triangle].color as usize].map(|c| (c as f64 * shade) as f32)
+    }
+}
+
+/// Calls `set` for samples that are nearer than what was there: with the triangle, and its light.
+fn draw(surface: &Surface, large: &View, style: &Style, mut set: impl FnMut(&Fragment, usize, Lit)) {
     let mut depth = vec![f32::NEG_INFINITY; large.width() as usize * large.height() as usize];
     let from = DVec3::new(-0.4, 0.7, 0.8).normalize();
     project(surface, large, style.shading == Shading::Smooth, |triangle, spots| {
@@ -143,30 +174,32 @@ fn draw(
             depth[f.index] = f.near;
             let n = f.normal.normalize_or(DVec3::Z);
             let n = if n.z < 0.0 { -n } else { n };
-            let mut shade = ambient + lamp * n.dot(from).max(0.0);
-            if style.wireframe && f.to_edge < HALF_LINE {
-                shade *= LINE_SHADE;
-            }
-            set(&f, triangle, shade);
+            let line = style.wireframe && f.to_edge < HALF_LINE;
+            let lit = Lit { lamp: n.dot(from).max(0.0), left: if line { LINE_SHADE } else { 1.0 } };
+            set(&f, triangle, lit);
         });
     });
 }
 
 /// The mean of every pixel's samples, from linear light to 8 bits. The square root is near the sRGB curve, and exact everywhere.
-fn developed(light: &[[f32; 3]], view: &View, samples: u32) -> Picture {
-    let mut picture = Picture::new(view.width(), view.height(), [0; 3]);
-    let across = (view.width() * samples) as usize;
-    let n = samples as usize;
+fn developed(light: &[[f32; 3]], view: &View, samples: u32, background: [f32; 3]) -> Picture {
+    let (across, n) = ((view.width() * samples) as usize, samples as usize);
+    let byte = |s: f64| ((s / (n * n) as f64).clamp(0.0, 1.0).sqrt() * 255.0).round() as u8;
+    let empty = background.map(|c| byte((n * n) as f64 * c as f64));
+    let mut picture = Picture::new(view.width(), view.height(), empty);
     for y in 0..view.height() {
         for x in 0..view.width() {
+            let first = y as usize * n * across + x as usize * n;
+            let mut rows = (0..n).map(|dy| &light[first + dy * across..][..n]);
+            if rows.clone().all(|row| row.iter().all(|s| *s == background)) {
+                continue;
+            }
             let mut sum = [0.0f64; 3];
-            for (dx, dy) in (0..n * n).map(|i| (i % n, i / n)) {
-                let sample = light[(y as usize * n + dy) * across + x as usize * n + dx];
+            for sample in rows.by_ref().flatten() {
                 for (s, l) in sum.iter_mut().zip(sample) {
-                    *s += l as f64;
+                    *s += *l as f64;
                 }
             }
-            let byte = |s: f64| ((s / (n * n) as f64).clamp(0.0, 1.0).sqrt() * 255.0).round() as u8;
             picture.set(x, y, sum.map(byte));
         }
     }
