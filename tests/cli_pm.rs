@@ -209,7 +209,22 @@ fn chunks_for_random_access_bring_the_same_mesh() {
     for (threads, name) in [(1, "one.pm"), (2, "two.pm")] {
         p.done(&format!("encode in.ply {name} -q --threads {threads}"));
         assert!(p.read(name) == p.read("in.pm"), "{threads} threads");
+        p.done(&format!("decode in.pm c.ply -q --threads {threads}"));
+        assert!(p.read("c.ply") == p.read("a.ply"), "{threads} threads");
     }
+}
+
+#[test]
+fn clustering_is_refused_with_what_to_do_instead() {
+    let p = Place::new();
+    p.generate("cad", "in.ply", 300);
+    for command in ["encode in.ply out.pm", "lod in.ply out.glb --levels 0.5"] {
+        let run = p.run(&format!("{command} --method cluster"));
+        assert_eq!(run.code, 2, "{command}");
+        assert!(run.stderr.contains("progmesh simplify") && run.stderr.contains("quadric"), "{}", run.stderr);
+        assert!(!run.stderr.contains("quadric, cluster"), "{}", run.stderr);
+    }
+    assert_eq!(p.files(), ["in.ply"]);
 }
 
 #[test]

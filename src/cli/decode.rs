@@ -32,6 +32,9 @@ pub(crate) struct Args {
     /// Of a damaged or cut-off file use what comes before the damage, instead of nothing
     #[arg(long)]
     salvage: bool,
+    /// Threads to use; the result does not depend on it [default: all]
+    #[arg(long, value_name = "N", value_parser = args::threads, allow_negative_numbers = true)]
+    threads: Option<usize>,
     /// Print one JSON object about the run on standard output (see docs/json.md)
     #[arg(long)]
     json: bool,
@@ -81,43 +84,56 @@ impl Args {
         let format = self.output.format(&mut warnings)?;
         let file = self.input.name();
         let interrupt = Interrupt::watch();
-        let read = self.input.read(self.salvage, &mut warnings)?;
-        let reading = start.elapsed().as_secs_f64();
-        interrupt.be_graceful();
-        let detail = self.detail.detail(&read);
-        if let Some(k) = self.detail.level.filter(|&k| k >= read.levels()) {
-            let last = read.levels().saturating_sub(1);
-            warnings.say([format!("{file}: there is no level {k}: the finest is level {last}")]);
-        }
-        let at = read.positions(detail);
-        let scene = read.at(&at).map_err(|(m, e)| Failure::Input(format!("{file}: mesh {m}: {e}")))?;
-        let refining = start.elapsed().as_secs_f64() - reading;
-        if interrupt.is_set() {
-            return Err(Failure::Interrupted);
-        }
-        self.output.write(format, &scene, &interrupt, &mut warnings)?;
-        let total = start.elapsed().as_secs_f64();
-        let report = Report {
-            command: "decode",
-            to: format.extension(),
-            meshes: scene.meshes.len(),
-            vertices: scene.meshes.iter().map(|m| m.geometry.positions.len()).sum(),
-            triangles: scene.unique_triangles(),
-            full_triangles: read.triangles(),
-            base_triangles: read.base_triangles(),
-            splits: at.iter().sum(),
-            full_splits: read.splits(),
-            seconds: Seconds { read: reading, refine: refining, write: total - reading - refining, total },
-            warnings: warnings.all,
-        };
+        let (detail, report) = common::in_pool(self.threads, || {
+            let read = self.input.read(self.salvage, &mut warnings)?;
+            let reading = start.elapsed().as_secs_f64();
+            interrupt.be_graceful();
+            let detail = self.detail.detail(&read);
+            if let Some(k) = self.detail.level.filter(|&k| k >= read.levels()) {
+                let last = read.levels().saturating_sub(1);
+                warnings.say([format!("{file}: there is no level {k}: the finest is level {last}")]);
+            }
+            let at = read.positions(detail);
+            let scene = read.at(&at).map_err(|(m, e)| Failure::Input(format!("{file}: mesh {m}: {e}")))?;
+            let refining = start.elapsed().as_secs_f64() - reading;
+            if interrupt.is_set() {
+                return Err(Failure::Interrupted);
+            }
+            self.output.write(format, &scene, &interrupt, &mut warnings)?;
+            let total = start.elapsed().as_secs_f64();
+            let report = Report {
+                command: "decode",
+                to: format.extension(),
+                meshes: scene.meshes.len(),
+                vertices: scene.meshes.iter().map(|m| m.geometry.positions.len()).sum(),
+                triangles: scene.unique_triangles(),
+                full_triangles: read.triangles(),
+                base_triangles: read.base_triangles(),
+                splits: at.iter().sum(),
+                full_splits: read.splits(),
+                seconds: Seconds {
+                    read: reading,
+                    refine: refining,
+                    write: total - reading - refining,
+                    total,
+                },
+                warnings: vec![],
+            };
+            Ok((detail, report))
+        })?;
+        let report = Report { warnings: warnings.all, ..report };
+        let t = &report.seconds;
         if !self.quiet {
             common::note(&format!(
-                "{file}: {} of {} triangles, {} of {}; {total:.3} s (read {reading:.3}, refine {refining:.3}, write {:.3})",
+                "{file}: {} of {} triangles, {} of {}; {:.3} s (read {:.3}, refine {:.3}, write {:.3})",
                 thousands(report.triangles),
                 thousands(report.full_triangles),
                 thousands(report.splits),
                 count(report.full_splits, "split"),
-                report.seconds.write
+                t.total,
+                t.read,
+                t.refine,
+                t.write
             ));
         }
         if self.json {

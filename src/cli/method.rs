@@ -69,11 +69,19 @@ enum ScheduleName {
     Bulk,
 }
 
-/// The methods that are sequences of collapses, which a progressive mesh needs.
+/// The methods that are sequences of collapses, which a progressive mesh needs; the other one is told why it is none.
 fn recorded() -> impl TypedValueParser<Value = MethodName> {
-    let methods = MethodName::value_variants().iter().filter(|m| **m != MethodName::Cluster);
-    PossibleValuesParser::new(methods.filter_map(ValueEnum::to_possible_value))
-        .try_map(|name| MethodName::from_str(&name, false))
+    let shown = |m: &MethodName| m.to_possible_value().map(|v| v.hide(*m == MethodName::Cluster));
+    PossibleValuesParser::new(MethodName::value_variants().iter().filter_map(shown)).try_map(|name| {
+        match MethodName::from_str(&name, false)? {
+            MethodName::Cluster => Err(
+                "clustering merges whole cells, which no vertex splits lead back from; use quadric or nsa \
+                 here, or cluster with progmesh simplify"
+                    .to_string(),
+            ),
+            method => Ok(method),
+        }
+    })
 }
 
 impl MethodName {
