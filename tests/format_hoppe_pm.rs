@@ -101,7 +101,9 @@ impl File {
         let mut wedges: Vec<(usize, Vec<f32>)> =
             (0..9).map(|v| (v, (0..stride).map(|_| random.float()).collect())).collect();
         wedges.push((0, (0..stride).map(|_| random.float()).collect()));
-        let faces = vec![([5, 7, 6], 2), ([5, 6, 8], 2), ([6, 7, 8], 0), ([7, 5, 8], 1)];
+        let mut faces = vec![([5, 7, 6], 2), ([5, 6, 8], 2), ([6, 7, 8], 0), ([7, 5, 8], 1)];
+        // Of every third file the base is open.
+        faces.truncate(if seed % 3 == 2 { 3 } else { 4 });
         let mesh = Plain { positions, wedges, faces };
         let states = vec![mesh.clone()];
         File { random, mesh, stride, materials: 3, records: vec![], states, residuals }
@@ -486,6 +488,35 @@ fn every_state_is_what_the_records_say() {
     for seed in 0..40 {
         check(seed, 60, seed % 2 == 0, seed % 3 == 0, seed % 5 == 0);
     }
+}
+
+#[test]
+fn splits_at_a_border_lengthen_it_by_one_edge() {
+    let mut at_border = 0;
+    for seed in 0..12 {
+        let (bytes, _) = file(seed, 60, false, false, false);
+        let read = decode_progressive(&bytes).unwrap();
+        let mesh = &read.scene.meshes[0];
+        let mut cursor = mesh.cursor().unwrap();
+        let border = |cursor: &progmesh::refine::Cursor<&progmesh::refine::ProgressiveMesh>| {
+            let mut faces_of = std::collections::HashMap::new();
+            for f in cursor.indices() {
+                let v = f.map(|w| cursor.wedge_vertex(w));
+                for k in 0..3 {
+                    let (a, b) = (v[k], v[(k + 1) % 3]);
+                    *faces_of.entry((a.min(b), a.max(b))).or_insert(0) += 1;
+                }
+            }
+            faces_of.values().filter(|&&n| n == 1).count()
+        };
+        for code in &mesh.splits.code {
+            let before = border(&cursor);
+            cursor.refine().unwrap();
+            assert_eq!(border(&cursor), before + usize::from(!code.two_faces()), "seed {seed}");
+            at_border += usize::from(!code.two_faces());
+        }
+    }
+    assert!(at_border > 20, "{at_border}");
 }
 
 #[test]
