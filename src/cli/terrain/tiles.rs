@@ -19,9 +19,9 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// How far below the curve of the Earth flat triangles may lie, as a part of the error, and of which error at least, in metres: a tenth leads to
-/// vertices 1.6 km apart.
-const SAG: f64 = 0.5;
+/// Vertices are spread so that sides from one to the next lie this part of the error, and of an error of so many metres at least, below the curve of
+/// the Earth. Where vertices between them are taken away, sides may be twice as long, and lie four times as far below.
+const SAG: f64 = 0.125;
 const LEAST_SAG: f64 = 0.1;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
