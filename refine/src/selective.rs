@@ -23,6 +23,7 @@ mod output;
 mod regulator;
 mod timed;
 
+pub(crate) use adapt::{BETWEEN, LOOKS};
 pub use adapt::{Done, Limits};
 pub use changes::Changes;
 pub(crate) use front::Front;

@@ -219,16 +219,7 @@ impl<'a> Walk<'a> {
             }
         }
         let keep = self.most.saturating_mul(faces);
-        if loose.len() > keep && keep > 0 {
-            let far = keep / 2;
-            loose.select_nth_unstable_by(far, |&a, &b| {
-                of(b).distance.total_cmp(&of(a).distance).then(a.cmp(&b))
-            });
-            // Those that are left of the order they were in lie about in no order at all.
-            let rest = loose.split_off(far);
-            let each = rest.len().div_ceil(keep - far);
-            loose.extend(rest.into_iter().step_by(each));
-        }
+        keep_farthest(loose, keep, |s| of(s).distance);
     }
 
     /// Puts a sample on its nearest face, and raises the error of who answers for it.
@@ -295,4 +286,17 @@ impl<'a> Walk<'a> {
         let c = self.candidate[answers as usize] as usize;
         self.error[c] = self.error[c].max(d);
     }
+}
+
+/// Leaves of samples as many as are to be kept: half of these are the farthest, the others spread.
+pub(super) fn keep_farthest(loose: &mut Vec<u32>, keep: usize, distance: impl Fn(u32) -> f32) {
+    if loose.len() <= keep || keep == 0 {
+        return;
+    }
+    let far = keep / 2;
+    loose.select_nth_unstable_by(far, |&a, &b| distance(b).total_cmp(&distance(a)).then(a.cmp(&b)));
+    // Those that are left of the order they were in lie about in no order at all.
+    let rest = loose.split_off(far);
+    let each = rest.len().div_ceil(keep - far);
+    loose.extend(rest.into_iter().step_by(each));
 }

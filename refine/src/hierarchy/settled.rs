@@ -5,6 +5,7 @@
 //! leads to bounds what can be seen where it is undone. That holds for samples one and all, as long as they are followed; where a face has many, some are left out.
 
 use super::bounds::Bounds;
+use super::deviation::keep_farthest;
 use super::forest::Forest;
 use super::spheres::{self, Extent};
 use super::{Finest, Options};
@@ -290,16 +291,7 @@ impl<'a> Walk<'a> {
             }
         }
         let keep = self.most.saturating_mul(faces);
-        if loose.len() > keep && keep > 0 {
-            let far = keep / 2;
-            loose.select_nth_unstable_by(far, |&a, &b| {
-                of(b).distance.total_cmp(&of(a).distance).then(a.cmp(&b))
-            });
-            // Those that are left of the order they were in lie about in no order at all.
-            let rest = loose.split_off(far);
-            let each = rest.len().div_ceil(keep - far);
-            loose.extend(rest.into_iter().step_by(each));
-        }
+        keep_farthest(loose, keep, |s| of(s).distance);
     }
 }
 

@@ -6,7 +6,7 @@ use super::{Open, PagedError, PagedView};
 use crate::aif::NONE;
 use crate::format::ByteRanges;
 use crate::progressive::Damage;
-use crate::selective::{Done, Lens, Limits};
+use crate::selective::{BETWEEN, Done, LOOKS, Lens, Limits};
 use std::cmp::Reverse;
 
 /// How far a frame may go.
@@ -39,9 +39,6 @@ pub struct PagedDone {
     pub fetched: usize,
 }
 
-/// Operations, and looks at splits, between two questions for the time: as in [`crate::selective`].
-const BETWEEN: usize = 64;
-const LOOKS: usize = 512;
 /// Needed splits are ordered by how much their errors exceed the tolerance: eight steps for each factor of two.
 const STEPS: f64 = 8.0;
 

@@ -41,9 +41,9 @@ pub struct Done {
 }
 
 /// Operations between two questions for the time.
-const BETWEEN: usize = 64;
+pub(crate) const BETWEEN: usize = 64;
 /// Looks at splits that count as many operations: a look takes about a tenth of an operation's time.
-const LOOKS: usize = 512;
+pub(crate) const LOOKS: usize = 512;
 /// Needed splits lie in buckets by how much their errors exceed the tolerance: eight for each factor of two.
 const BUCKETS: usize = 256;
 
