@@ -74,9 +74,13 @@ impl Mesh {
 
     /// The wedges of [`Mesh::to_input`] alone. O(n).
     pub fn input_wedges(&self) -> Option<Wedges> {
-        let t = &self.topology;
+        let (t, w) = (&self.topology, self.wedges.as_ref()?);
+        let whole = t.is_triangular() && t.face_count() == t.face_slots();
+        if whole && is_by_first_use(w) {
+            return Some(w.clone());
+        }
         let slots = t.faces().flat_map(|f| t.corner_range(f));
-        self.wedges.as_ref().map(|w| by_first_use(w, slots, w.corner.len()))
+        Some(by_first_use(w, slots, w.corner.len()))
     }
 
     /// As [`Mesh::to_input`], with the map of vertex slots to the vertices of the result ([`NONE`] for removed ones).
@@ -124,6 +128,19 @@ fn number(n: usize, keep: impl Fn(u32) -> bool) -> (Vec<u32>, Vec<u32>) {
 /// The entries of the kept faces; an absent array stays absent.
 fn gather(per_face: &[u32], kept: &[u32]) -> Vec<u32> {
     if per_face.is_empty() { Vec::new() } else { kept.iter().map(|&f| per_face[f as usize]).collect() }
+}
+
+/// Whether the corners, one after the other, use the wedges 0, 1, 2 and so on for the first time in this order, and all of them.
+fn is_by_first_use(w: &Wedges) -> bool {
+    let mut next = 0;
+    for &x in &w.corner {
+        if x == next {
+            next += 1;
+        } else if x > next && x != NONE {
+            return false;
+        }
+    }
+    next as usize == w.len()
 }
 
 fn by_first_use(w: &Wedges, slots: impl Iterator<Item = usize>, corners: usize) -> Wedges {
@@ -280,6 +297,36 @@ mod tests {
         assert_eq!((mesh.vertex_count(), mesh.topology.edge_count()), (6, 6));
         let w = mesh.wedges().unwrap();
         assert_eq!((w.len(), &w.corner[..]), (2, &[1, 1, 0, NONE, 0, 0][..]));
+    }
+
+    #[test]
+    fn wedges_are_numbered_by_first_use_whatever_their_numbers_were() {
+        let channels = || vec![Channel::new(Semantic::Custom("id".into()), 1)];
+        for corner in
+            [[0, 1, 2, 2, NONE, 0], [2, 1, 0, 0, NONE, 2], [0, 1, 1, 1, NONE, 0], [0, 2, 1, 1, 2, 0]]
+        {
+            let mut m = Mesh::from_triangles(
+                vec![[0.0f32; 3], [1.0; 3], [2.0; 3], [3.0; 3]],
+                &[[0, 1, 2], [2, 1, 3]],
+            )
+            .unwrap();
+            let mut w = Wedges::new(channels()).unwrap();
+            (0..3).for_each(|i| _ = w.push(&[i as f32], 1));
+            w.corner = corner.to_vec();
+            *m.wedges_mut() = Some(w.clone());
+            let found = m.input_wedges().unwrap();
+            assert_eq!(Some(&found), m.to_input().wedges.as_ref(), "{corner:?}");
+            let mut seen = 0;
+            for (&x, &old) in found.corner.iter().zip(&corner) {
+                assert_eq!(x == NONE, old == NONE);
+                if x != NONE {
+                    assert!(x <= seen, "{corner:?}");
+                    seen = seen.max(x + 1);
+                    assert_eq!(found.row(x), w.row(old));
+                }
+            }
+            assert_eq!(found.len(), seen as usize);
+        }
     }
 
     #[test]

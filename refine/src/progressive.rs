@@ -14,6 +14,7 @@ mod fetch;
 mod input;
 pub(crate) mod links;
 mod order;
+mod replay;
 
 pub(crate) use attributes::Explicit;
 pub use build::{Built, BuiltAll, EncodeError, build, build_all};

@@ -279,11 +279,11 @@ impl<'m> Collapser<'m> {
             error = q.at(step) / q.weight;
             self.worst = self.worst.max(error);
         }
-        if let Some(log) = &mut self.log {
-            log.note_wedges(self.work.mesh, e, c.roles.kept, c.roles.removed);
-        }
         let q = q.moved(step);
-        self.wedges.merge(&mut self.work, e, &c.roles, to);
+        self.wedges.merge(&mut self.work, e, &c.roles, to, self.log.as_mut().map(CollapseLog::notes));
+        if let Some(log) = self.log.as_mut().filter(|_| self.wedges.active()) {
+            log.end_run();
+        }
         self.quadrics[k] = q;
         let old = self.log.is_some().then(|| self.work.model_position(c.roles.kept));
         let record = self.work.perform(e, &c.roles, to);

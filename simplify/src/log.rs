@@ -2,10 +2,9 @@
 
 use crate::finish::target;
 use crate::options::{Control, Level, Method, Options, SimplifyError, Stop};
-use crate::work::wedge_at;
 use crate::{nsa, quadric_collapse};
 use glam::DVec3;
-use progmesh_aif::{CollapseRecord, EdgeId, EdgeUse, FaceId, Mesh, NONE, Topology, VertexId, Wedges};
+use progmesh_aif::{CollapseRecord, EdgeId, EdgeUse, FaceId, Mesh, NONE, Topology, VertexId};
 
 /// A triangle that a collapse removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,9 +64,9 @@ pub struct CollapseLog {
     pub steps: Vec<LoggedCollapse>,
     /// Ends of every step's runs in `corners` and `rows`; empty without wedges.
     pub ends: Vec<(u32, u32)>,
-    /// Corner slots of the removed vertex, and the wedges they had.
+    /// Corner slots of the removed vertex on the faces that stay, and the wedges they had. Those of the triangles that go keep theirs.
     pub corners: Vec<(u32, u32)>,
-    /// Wedges of the kept vertex beside the edge, and the channels they had.
+    /// Wedges of the kept vertex that got other values, and the channels they had.
     pub rows: Vec<(u32, u64)>,
     /// The values they had, row after row.
     pub values: Vec<f32>,
@@ -116,10 +115,14 @@ pub fn record_all(
 }
 
 impl CollapseLog {
-    /// Writes down the wedges that merging may change, before it does.
-    pub(crate) fn note_wedges(&mut self, mesh: &Mesh, e: EdgeId, kept: VertexId, removed: VertexId) {
-        let Some(wedges) = mesh.wedges() else { return };
-        note_wedges(mesh, wedges, e, (kept, removed), &mut self.corners, &mut self.rows, &mut self.values);
+    /// Where merging wedges writes down what it overwrites; [`CollapseLog::end_run`] ends it.
+    pub(crate) fn notes(&mut self) -> Notes<'_> {
+        Notes { corners: &mut self.corners, rows: &mut self.rows, values: &mut self.values }
+    }
+
+    /// Ends the run of the collapse at hand.
+    #[inline]
+    pub(crate) fn end_run(&mut self) {
         self.ends.push((self.corners.len() as u32, self.rows.len() as u32));
     }
 
@@ -144,6 +147,8 @@ impl CollapseLog {
 /// The faces across the sides of a removed triangle, which share one edge now.
 #[inline]
 fn look_at_wing(t: &Topology, wing: &progmesh_aif::Wing, kept: VertexId, edge: EdgeId) -> LoggedWing {
+    let [first, _] = t.edge_vertices(wing.kept_edge);
+    let leaving = EdgeUse::new(wing.kept_edge, first != kept);
     let half = |g: FaceId| {
         let uses = t.face_edges(g);
         let i = if uses[0].edge() == wing.kept_edge {
@@ -153,55 +158,37 @@ fn look_at_wing(t: &Topology, wing: &progmesh_aif::Wing, kept: VertexId, edge: E
         } else {
             2
         };
-        (g.0 * 4 + i as u32, t.origin(uses[i]) == kept)
+        (g.0 * 4 + i as u32, uses[i] == leaving)
     };
+    let nothing = (NONE, false);
     // What is gone keeps its relations: the merged edge still names the face it lost.
     let beyond = t.edge_faces(wing.removed_edge).iter().copied().find(|&g| g != wing.face);
-    let now = t.edge_faces(wing.kept_edge);
-    let beside = now.iter().copied().find(|&g| Some(g) != beyond).filter(|_| now.len() <= 2);
-    let beyond = beyond.map(half);
-    let beside = beside.map(half);
+    let beside = match *t.edge_faces(wing.kept_edge) {
+        [f] | [f, _] if Some(f) != beyond => half(f),
+        [_, g] => half(g),
+        _ => nothing,
+    };
+    let beyond = beyond.map_or(nothing, half);
     let slot = wing.slot as usize;
     let run = t.face_edges(wing.face)[slot];
     debug_assert_eq!(run.edge(), edge);
     LoggedWing {
         face: wing.face.0,
-        kept_half: beside.map_or(NONE, |h| h.0),
-        removed_half: beyond.map_or(NONE, |h| h.0),
+        kept_half: beside.0,
+        removed_half: beyond.0,
         slot: slot as u8,
         kept_first: t.origin(run) == kept,
-        kept_half_starts: beside.is_some_and(|h| h.1),
-        removed_half_starts: beyond.is_some_and(|h| h.1),
+        kept_half_starts: beside.1,
+        removed_half_starts: beyond.1,
     }
 }
 
-/// Appends the corners of the removed vertex with their wedges, and the kept vertex's wedges on the faces of `e` with their values.
-pub(crate) fn note_wedges(
-    mesh: &Mesh,
-    wedges: &Wedges,
-    e: EdgeId,
-    (kept, removed): (VertexId, VertexId),
-    corners: &mut Vec<(u32, u32)>,
-    rows: &mut Vec<(u32, u64)>,
-    values: &mut Vec<f32>,
-) {
-    let t = mesh.topology();
-    for &side in t.star(removed) {
-        for &f in t.edge_faces(side) {
-            // Each face once, by the side that begins at the vertex.
-            let begins = |&u: &EdgeUse| u.edge() == side && t.origin(u) == removed;
-            if let Some(i) = t.face_edges(f).iter().position(begins) {
-                let c = t.corner_range(f).start + i;
-                corners.push((c as u32, wedges.corner[c]));
-            }
-        }
-    }
-    let first = rows.len();
-    for &f in t.edge_faces(e) {
-        let w = wedge_at(mesh, wedges, f, kept);
-        if w != NONE && !rows[first..].iter().any(|r| r.0 == w) {
-            rows.push((w, wedges.present(w)));
-            values.extend_from_slice(wedges.row(w));
-        }
-    }
+/// Where merging wedges writes down what it overwrites.
+pub(crate) struct Notes<'a> {
+    /// Corner slots, and the wedges they had; also those that keep theirs.
+    pub(crate) corners: &'a mut Vec<(u32, u32)>,
+    /// Wedges, and the channels they had.
+    pub(crate) rows: &'a mut Vec<(u32, u64)>,
+    /// The values they had, row after row.
+    pub(crate) values: &'a mut Vec<f32>,
 }

@@ -1,14 +1,17 @@
 //! Attributes follow a collapse: every wedge of the kept vertex gets the values at its new place.
 
+use crate::log::Notes;
 use crate::work::{Roles, Work, wedge_at};
 use glam::DVec3;
-use progmesh_aif::{EdgeId, FaceId, NONE, Semantic, VertexId, Wedges};
+use progmesh_aif::{EdgeId, EdgeUse, FaceId, NONE, Semantic, Topology, VertexId, Wedges};
 
 /// Merges wedges when an edge collapses.
 pub(crate) struct WedgeMerge {
     active: bool,
     row: Vec<f32>,
     influences: Vec<(f32, f32)>,
+    /// Corners of the removed vertex and their wedges, where nobody notes them.
+    corners: Vec<(u32, u32)>,
 }
 
 /// A face on the edge: its wedges at the kept vertex, the removed vertex and the tip, and weights that give the new place.
@@ -21,16 +24,29 @@ impl WedgeMerge {
     /// Gives every group of corners between seams a wedge of its own, so that values can change in place. O(n).
     pub(crate) fn new(work: &mut Work<'_>) -> Self {
         let Some(mut wedges) = work.mesh.wedges_mut().take() else {
-            return WedgeMerge { active: false, row: Vec::new(), influences: Vec::new() };
+            return WedgeMerge {
+                active: false,
+                row: Vec::new(),
+                influences: Vec::new(),
+                corners: Vec::new(),
+            };
         };
         separate_groups(work, &mut wedges);
         let stride = wedges.stride();
         *work.mesh.wedges_mut() = Some(wedges);
-        WedgeMerge { active: true, row: vec![0.0; stride], influences: Vec::new() }
+        WedgeMerge { active: true, row: vec![0.0; stride], influences: Vec::new(), corners: Vec::new() }
     }
 
-    /// Updates the wedges for the collapse of `e`, before the topology changes.
-    pub(crate) fn merge(&mut self, work: &mut Work<'_>, e: EdgeId, roles: &Roles, to: DVec3) {
+    /// Updates the wedges for the collapse of `e`, before the topology changes, and writes down what it overwrites. Corners of triangles on `e`, which
+    /// vanish, stay as they are.
+    pub(crate) fn merge(
+        &mut self,
+        work: &mut Work<'_>,
+        e: EdgeId,
+        roles: &Roles,
+        to: DVec3,
+        notes: Option<Notes<'_>>,
+    ) {
         if !self.active {
             return;
         }
@@ -47,6 +63,14 @@ impl WedgeMerge {
             let drop = if x.weights[2] >= y.weights[2] { 1 } else { 0 };
             sides[drop] = None;
         }
+        let mut own = std::mem::take(&mut self.corners);
+        own.clear();
+        let (corners, mut noted) = match notes {
+            Some(Notes { corners, rows, values }) => (corners, Some((rows.len(), rows, values))),
+            None => (&mut own, None),
+        };
+        let first = corners.len();
+        gather_corners(t, &wedges.corner, e, roles.removed, corners);
         for side in sides.iter().flatten() {
             let [wk, wr, _] = side.wedges;
             if wk == NONE || wr == NONE {
@@ -54,20 +78,27 @@ impl WedgeMerge {
             }
             if !roles.fixed {
                 self.interpolate(&wedges, side);
-                wedges.row_mut(wk).copy_from_slice(&self.row);
-                wedges.set_present(wk, wedges.present(wk) | wedges.present(wr));
-            }
-            let t = work.mesh.topology();
-            for f in t.vertex_faces(roles.removed) {
-                let range = t.corner_range(f);
-                if let Some(i) = t.face_vertices(f).position(|v| v == roles.removed) {
-                    let w = &mut wedges.corner[range.start + i];
-                    if *w == wr {
-                        *w = wk;
+                let (had, has) = (wedges.present(wk), wedges.present(wk) | wedges.present(wr));
+                let same = |(a, b): (&f32, &f32)| a.to_bits() == b.to_bits();
+                if had != has || !wedges.row(wk).iter().zip(&self.row).all(same) {
+                    if let Some((start, rows, values)) = &mut noted
+                        && rows[*start..].iter().all(|r| r.0 != wk)
+                    {
+                        rows.push((wk, had));
+                        values.extend_from_slice(wedges.row(wk));
                     }
+                    wedges.row_mut(wk).copy_from_slice(&self.row);
+                    wedges.set_present(wk, has);
+                }
+            }
+            for &(c, _) in &corners[first..] {
+                let w = &mut wedges.corner[c as usize];
+                if *w == wr {
+                    *w = wk;
                 }
             }
         }
+        self.corners = own;
         *work.mesh.wedges_mut() = Some(wedges);
     }
 
@@ -167,6 +198,24 @@ impl WedgeMerge {
                 if i < wedges.channels()[k].width {
                     self.row[wedges.offset(k) + i] = x * scale;
                 }
+            }
+        }
+    }
+}
+
+/// Appends the corners of `v` on faces that survive the collapse of `e`, each with its wedge. O(valence).
+#[inline]
+fn gather_corners(t: &Topology, wedge: &[u32], e: EdgeId, v: VertexId, out: &mut Vec<(u32, u32)>) {
+    let gone = t.edge_faces(e);
+    for &side in t.star(v) {
+        // Each face once: at the edge by which it leaves `v`.
+        let leaving = EdgeUse::new(side, t.edge_vertices(side)[0] != v);
+        for &f in t.edge_faces(side) {
+            let uses = t.face_edges(f);
+            let Some(i) = uses.iter().position(|&u| u == leaving) else { continue };
+            if uses.len() > 3 || !gone.contains(&f) {
+                let c = t.corner_range(f).start + i;
+                out.push((c as u32, wedge[c]));
             }
         }
     }

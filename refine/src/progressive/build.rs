@@ -1,12 +1,14 @@
 //! From recorded collapses to vertex splits.
 
 use super::input::InputOrder;
-use super::{ProgressiveMesh, SplitCode, Splits, WedgeStreams};
-use crate::aif::{BuildError, Mesh, MeshInput, NONE, Positions, Wedges};
+use super::replay::WedgeReplay;
+use super::{ProgressiveMesh, SplitCode, Splits};
+use crate::aif::{BuildError, Mesh, MeshInput, NONE, Positions, VertexId, Wedges};
 use crate::simplify::{
     CollapseLog, Control, LoggedCollapse, LoggedWing, Method, Options, Recorded, SimplifyError, Stop,
     record_all,
 };
+use glam::DVec3;
 use rustc_hash::FxHashMap;
 
 /// Why no progressive mesh was made.
@@ -50,8 +52,8 @@ pub struct BuiltAll {
 /// Simplifies `mesh` by edge collapse as far as `options` ask (or, without a target, as far as is legal) and returns the base with the splits
 /// that lead back.
 ///
-/// Polygons are cut into triangles first; full detail returns them. Removed elements of the mesh are left out. Takes the time of the simplification and
-/// about a tenth more, with attributes up to a fifth (in instructions, bunny: NSA 1.11, with a uv map and a seam 1.21).
+/// Polygons are cut into triangles first; full detail returns them. Removed elements of the mesh are left out. Takes the time of the simplification and about a tenth more (in
+/// instructions, by `examples/recording`: bunny 1.09 with NSA, 1.08 by the exact schedule; with a uv map and a seam 1.05, 1.11, and 1.10 in bulk).
 ///
 /// Errors: an option out of its range, pruning, clustering.
 pub fn build(mesh: Mesh, options: &Options, control: &dyn Control) -> Result<Built, EncodeError> {
@@ -80,9 +82,10 @@ pub fn build_all(
     let estimates = recorded.iter().map(|r| r.estimate).collect();
     let each = cut.into_iter().zip(recorded).zip(inputs);
     let meshes = each
-        .map(|((mesh, recorded), (input, triangles))| {
+        .map(|((mut mesh, recorded), (input, triangles))| {
             let slots = Slots::new(&mesh, &recorded.log);
-            let (mut pm, full) = Builder::new(&mesh, &recorded.log, &slots).run();
+            let (positions, wedges) = (std::mem::take(mesh.positions_mut()), mesh.wedges_mut().take());
+            let (mut pm, full) = Builder::new(&mesh, &recorded.log, &slots).run(positions, wedges);
             pm.order = Some(InputOrder::find(full.as_ref(), &slots, input.as_ref(), triangles.as_ref()));
             pm.levels = find_levels(&pm, &recorded, options.method);
             pm
@@ -213,75 +216,49 @@ struct Builder<'a> {
     pm: ProgressiveMesh,
 }
 
-/// Wedges while the splits are made: as they are in the mesh of the moment.
-struct WedgeReplay<'a> {
-    log: &'a CollapseLog,
-    wedges: Wedges,
-    /// Wedge of the mesh -> slot.
-    slot: Vec<u32>,
-    count: u32,
-    out: WedgeStreams,
-    /// (coarse, fine) wedges of the split at hand.
-    pairs: Vec<(u32, u32)>,
-    /// Wedges of which the split at hand changes the values.
-    changed: Vec<u32>,
-}
-
 impl<'a> Builder<'a> {
     fn new(mesh: &'a Mesh, log: &'a CollapseLog, slots: &'a Slots) -> Self {
         Builder { mesh, log, slots, pm: ProgressiveMesh::default() }
     }
 
-    /// The progressive mesh; the wedges at full detail.
-    fn run(mut self) -> (ProgressiveMesh, Option<WedgeReplay<'a>>) {
+    /// The progressive mesh, given positions and wedges of the mesh, which it has not any more; the wedges at full detail.
+    fn run(
+        mut self,
+        mut now: Positions,
+        wedges: Option<Wedges>,
+    ) -> (ProgressiveMesh, Option<WedgeReplay<'a>>) {
         let (mesh, log, t) = (self.mesh, self.log, self.mesh.topology());
         let n = log.steps.len();
         let alive: Vec<u32> = t.vertices().map(|v| v.0).collect();
-        self.pm.base_positions = mesh.positions().gather(&alive);
+        let removed: Vec<u32> = log.steps.iter().rev().map(|s| s.removed).collect();
+        self.pm.base_positions = now.gather(&alive);
+        // A vertex that is gone stays where it was.
+        self.pm.new_positions = now.gather(&removed);
         self.pm.wires = t
             .edges()
             .filter(|&e| t.edge_faces(e).is_empty())
             .map(|e| t.edge_vertices(e).map(|v| self.slots.vertex[v.index()]))
             .collect();
-        let order: Vec<u32> = {
-            let mut order = vec![0; t.face_slots()];
-            self.slots.face.iter().enumerate().for_each(|(f, &slot)| order[slot as usize] = f as u32);
-            order
-        };
         let per_face = |values: &[u32]| {
-            if values.is_empty() { Vec::new() } else { order.iter().map(|&f| values[f as usize]).collect() }
+            let mut by_slot = vec![NONE; values.len()];
+            values.iter().zip(&self.slots.face).for_each(|(&x, &slot)| by_slot[slot as usize] = x);
+            by_slot
         };
         self.pm.face_material = per_face(mesh.face_materials());
         self.pm.face_group = per_face(mesh.face_groups());
-        let mut wedges = mesh.wedges().map(|w| WedgeReplay::new(w, log, mesh));
-        self.pm.base_faces = t
-            .faces()
-            .map(|f| match &wedges {
-                None => t.triangle(f).map(|v| self.slots.vertex[v.index()]),
-                Some(w) => {
-                    let c = 3 * f.index();
-                    [c, c + 1, c + 2].map(|c| w.slot[w.wedges.corner[c] as usize])
-                }
-            })
-            .collect();
-        if let Some(w) = &mut wedges {
-            w.out.base_vertex = vec![0; w.count as usize];
-            for f in t.faces() {
-                for (k, v) in t.triangle(f).into_iter().enumerate() {
-                    let slot = w.slot[w.wedges.corner[3 * f.index() + k] as usize];
-                    w.out.base_vertex[slot as usize] = self.slots.vertex[v.index()];
-                }
-            }
-        }
-        let empty =
-            || if mesh.positions().is_f64() { Positions::F64(Vec::new()) } else { Positions::default() };
+        let slot_of = |v: VertexId| self.slots.vertex[v.index()];
+        let mut wedges = wedges.map(|w| WedgeReplay::new(w, log, t, slot_of));
+        self.pm.base_faces = match &wedges {
+            None => t.faces().map(|f| t.triangle(f).map(slot_of)).collect(),
+            Some(w) => t.faces().map(|f| w.corners(f)).collect(),
+        };
+        let empty = || if now.is_f64() { Positions::F64(Vec::new()) } else { Positions::default() };
         let (mut moved, mut splits) = (empty(), Splits::default());
         splits.vertex.reserve(n);
         splits.left.reserve(n);
         splits.right.reserve(n);
         splits.code.reserve(n);
         splits.error.reserve(n);
-        let mut now = mesh.positions().clone();
         for (i, s) in log.steps.iter().enumerate().rev() {
             let [l, r] = wings(s);
             let (mut code, left) = self.cut(&l, 0);
@@ -291,9 +268,7 @@ impl<'a> Builder<'a> {
                 (code, right) = (code | bits | SplitCode::TWO_FACES, cut);
             }
             let kept = s.kept as usize;
-            let before = raw_bits(&now, kept);
-            now.set(kept, s.old_position);
-            if raw_bits(&now, kept) != before {
+            if put(&mut now, kept, s.old_position) {
                 code |= SplitCode::MOVES;
                 push(&mut moved, &now, kept);
             }
@@ -306,11 +281,9 @@ impl<'a> Builder<'a> {
             splits.code.push(SplitCode(code));
             splits.error.push(s.error);
         }
-        let removed: Vec<u32> = log.steps.iter().rev().map(|s| s.removed).collect();
-        self.pm.new_positions = mesh.positions().gather(&removed);
         self.pm.moved_positions = moved;
         self.pm.splits = splits;
-        self.pm.wedges = wedges.as_mut().map(|w| std::mem::take(&mut w.out));
+        self.pm.wedges = wedges.as_mut().map(WedgeReplay::streams);
         nest_errors(&mut self.pm);
         (self.pm, wedges)
     }
@@ -341,189 +314,6 @@ impl<'a> Builder<'a> {
     }
 }
 
-impl<'a> WedgeReplay<'a> {
-    /// At the base: its wedges are numbered by first use.
-    fn new(wedges: &Wedges, log: &'a CollapseLog, mesh: &Mesh) -> Self {
-        let wedges = wedges.clone();
-        let mut slot = vec![NONE; wedges.len()];
-        let mut out = WedgeStreams {
-            channels: wedges.channels().to_vec(),
-            stride: wedges.stride(),
-            ..Default::default()
-        };
-        let mut count = 0;
-        for f in mesh.topology().faces() {
-            for &w in &wedges.corner[3 * f.index()..3 * f.index() + 3] {
-                if slot[w as usize] == NONE {
-                    slot[w as usize] = count;
-                    count += 1;
-                    out.rows.extend_from_slice(wedges.row(w));
-                    out.present.push(wedges.present(w));
-                }
-            }
-        }
-        WedgeReplay { log, wedges, slot, count, out, pairs: Vec::new(), changed: Vec::new() }
-    }
-
-    fn run_of(&self, i: usize) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
-        let start = if i == 0 { (0, 0) } else { self.log.ends[i - 1] };
-        let end = self.log.ends[i];
-        (start.0 as usize..end.0 as usize, start.1 as usize..end.1 as usize)
-    }
-
-    /// Undoes collapse `i`; returns the bits of its code.
-    fn split(&mut self, i: usize, l: &LoggedWing, r: &LoggedWing) -> u16 {
-        let (corners, old_rows) = self.run_of(i);
-        let log = self.log;
-        let two = r.face != NONE;
-        let corner_at = |w: &Wedges, half: u32| {
-            // The corner of a face at the vertex that is split.
-            let of = |wing: &LoggedWing| {
-                let starts =
-                    if half == wing.removed_half { wing.removed_half_starts } else { wing.kept_half_starts };
-                let k = if starts { half & 3 } else { ((half & 3) + 1) % 3 };
-                w.corner[(3 * (half >> 2) + k) as usize]
-            };
-            if half == l.removed_half || half == l.kept_half { of(l) } else { of(r) }
-        };
-        // Coarse wedges at both ends of the run of faces that go to the new vertex.
-        let first = if l.removed_half != NONE { l.removed_half } else { l.kept_half };
-        let mut x_l = corner_at(&self.wedges, first);
-        let mut x_r =
-            if two && r.removed_half != NONE { corner_at(&self.wedges, r.removed_half) } else { x_l };
-        let [plain_l, plain_r] = [x_l, x_r];
-        if two {
-            let outer =
-                |wing: &LoggedWing| (wing.kept_half != NONE).then(|| corner_at(&self.wedges, wing.kept_half));
-            (x_l, x_r) = super::seam_wedges(x_l, x_r, outer(l), outer(r));
-        }
-        // Pairs (coarse, fine) over those faces, the removed ones left out.
-        let wing_face = |c: u32| c / 3 == l.face || (two && c / 3 == r.face);
-        let mut pairs = std::mem::take(&mut self.pairs);
-        pairs.clear();
-        for &(c, fine) in &log.corners[corners.clone()] {
-            let pair = (self.wedges.corner[c as usize], fine);
-            if !wing_face(c) && !pairs.contains(&pair) {
-                pairs.push(pair);
-            }
-        }
-        // Back to the fine state.
-        for &(c, fine) in &log.corners[corners] {
-            self.wedges.corner[c as usize] = fine;
-        }
-        let stride = self.wedges.stride();
-        let mut changed = std::mem::take(&mut self.changed);
-        changed.clear();
-        for k in old_rows {
-            let (w, present) = log.rows[k];
-            let old = &log.values[k * stride..(k + 1) * stride];
-            let same = self.wedges.present(w) == present
-                && self.wedges.row(w).iter().zip(old).all(|(a, b)| a.to_bits() == b.to_bits());
-            if !same {
-                self.wedges.set_present(w, present);
-                self.wedges.row_mut(w).copy_from_slice(old);
-                changed.push(w);
-            }
-        }
-        // Corners of the new faces: at the old vertex, the new one, the tip.
-        let of_wing = |wing: &LoggedWing| {
-            let c = 3 * wing.face as usize;
-            let (a, b) = (wing.slot as usize, (wing.slot as usize + 1) % 3);
-            let at = |k: usize| self.wedges.corner[c + k];
-            let (vt, vu) = if wing.kept_first { (at(a), at(b)) } else { (at(b), at(a)) };
-            [vt, vu, at((wing.slot as usize + 2) % 3)]
-        };
-        let fl = of_wing(l);
-        let fr = if two { of_wing(r) } else { [plain_l, fl[1], NONE] };
-        // New wedges that only the new faces have.
-        for w in [(fl[0], fl[1]), (fr[0], fr[1])] {
-            if self.slot[w.1 as usize] == NONE && !pairs.iter().any(|p| p.1 == w.1) {
-                pairs.push(w);
-            }
-        }
-        let tip_at = |wing: &LoggedWing, half: u32, starts: bool| {
-            let k = if starts { ((half & 3) + 1) % 3 } else { half & 3 };
-            debug_assert!(wing.face != half >> 2);
-            self.wedges.corner[(3 * (half >> 2) + k) as usize]
-        };
-        let tip = |wing: &LoggedWing, want: u32| {
-            let outer = (wing.kept_half != NONE).then(|| tip_at(wing, wing.kept_half, wing.kept_half_starts));
-            let inner = (wing.removed_half != NONE)
-                .then(|| tip_at(wing, wing.removed_half, wing.removed_half_starts));
-            match (outer, inner) {
-                (Some(o), _) if o == want => Some(false),
-                (None, Some(i)) if i == want => Some(false),
-                (_, Some(i)) if i == want => Some(true),
-                _ => None,
-            }
-        };
-        let (tip_l, tip_r) = (tip(l, fl[2]), if two { tip(r, fr[2]) } else { Some(false) });
-        let fresh = |w: u32| self.slot[w as usize] == NONE;
-        let within = |allowed: &[u32]| changed.iter().all(|w| allowed.contains(w));
-        let plain = pairs.len() == 1
-            && plain_l == plain_r
-            && pairs[0] == (plain_l, fl[1])
-            && fresh(fl[1])
-            && fl[0] == plain_l
-            && fr[..2] == [plain_l, fl[1]]
-            && within(&[plain_l]);
-        let seam = two
-            && pairs.len() == 2
-            && x_l != x_r
-            && fl[1] != fr[1]
-            && pairs.contains(&(x_l, fl[1]))
-            && pairs.contains(&(x_r, fr[1]))
-            && fresh(fl[1])
-            && fresh(fr[1])
-            && fl[0] == x_l
-            && fr[0] == x_r
-            && within(&[x_l, x_r]);
-        let mut bits = 0;
-        bits |= if tip_l == Some(true) { SplitCode::L_TIP_INNER } else { 0 };
-        bits |= if tip_r == Some(true) { SplitCode::R_TIP_INNER } else { 0 };
-        let simple = tip_l.is_some() && tip_r.is_some() && (plain || seam);
-        let (made, listed) = ([fl[1], fr[1]], if plain { [plain_l; 2] } else { [x_l, x_r] });
-        let fresh_pairs: Vec<u32>;
-        let (new, rows): (&[u32], &[u32]) = if simple {
-            bits |= (!plain as u16) << SplitCode::KIND;
-            let count = 2 - plain as usize;
-            (&made[..count], if changed.is_empty() { &[] } else { &listed[..count] })
-        } else {
-            bits |= 2 << SplitCode::KIND;
-            fresh_pairs = pairs.iter().map(|p| p.1).filter(|&w| fresh(w)).collect();
-            (&fresh_pairs, &changed)
-        };
-        for &w in new {
-            self.slot[w as usize] = self.count;
-            self.count += 1;
-        }
-        if !rows.is_empty() {
-            bits |= SplitCode::ROWS;
-        }
-        for &w in new.iter().chain(rows) {
-            self.out.rows.extend_from_slice(self.wedges.row(w));
-            self.out.present.push(self.wedges.present(w));
-        }
-        if bits >> SplitCode::KIND & 3 == 2 {
-            let slot = |w: u32| self.slot[w as usize];
-            let out = &mut self.out.explicit;
-            out.extend([pairs.len() as u32, changed.len() as u32]);
-            out.extend(pairs.iter().flat_map(|p| [slot(p.0), slot(p.1)]));
-            out.extend(changed.iter().map(|&w| slot(w)));
-            // Tips by their neighbours where that tells them: it holds in any order of the splits.
-            let with_tip = |c: [u32; 3], rule: Option<bool>| {
-                [slot(c[0]), slot(c[1]), if rule.is_some() { NONE } else { slot(c[2]) }]
-            };
-            out.extend(with_tip(fl, tip_l));
-            if two {
-                out.extend(with_tip(fr, tip_r));
-            }
-        }
-        (self.pairs, self.changed) = (pairs, changed);
-        bits
-    }
-}
-
 impl InputOrder {
     /// What the input looked like, seen from the progressive mesh that was made of it; `full` holds the wedges at full detail. O(n).
     fn find(
@@ -542,7 +332,7 @@ impl InputOrder {
             order.note_polygons(input, triangles, map);
         }
         if let (Some(full), Some(w)) = (full, &input.wedges) {
-            order.note_wedges(&full.wedges, &full.slot, w);
+            full.compare(&mut order, w);
         }
         order
     }
@@ -561,12 +351,19 @@ fn nest_errors(pm: &mut ProgressiveMesh) {
     }
 }
 
-/// The bits of point `i`, signs of zeros included.
+/// Sets point `i`; true if its bits change, signs of zeros included.
 #[inline]
-fn raw_bits(p: &Positions, i: usize) -> [u64; 3] {
+fn put(p: &mut Positions, i: usize, to: DVec3) -> bool {
     match p {
-        Positions::F32(a) => a[i].map(|x| x.to_bits() as u64),
-        Positions::F64(a) => a[i].map(f64::to_bits),
+        Positions::F32(a) => {
+            let new = [to.x as f32, to.y as f32, to.z as f32];
+            let old = std::mem::replace(&mut a[i], new);
+            old.map(f32::to_bits) != new.map(f32::to_bits)
+        }
+        Positions::F64(a) => {
+            let old = std::mem::replace(&mut a[i], to.to_array());
+            old.map(f64::to_bits) != to.to_array().map(f64::to_bits)
+        }
     }
 }
 

@@ -83,20 +83,27 @@ impl InputOrder {
 
     /// Compares the wedges of `full`, the triangles at full detail, with the input's; `slot` is the slot of every wedge of `full`.
     pub(super) fn note_wedges(&mut self, full: &Wedges, slot: &[u32], input: &Wedges) {
+        const UNSEEN: u32 = NONE - 1;
         let slots = slot.iter().filter(|s| **s != NONE).count();
-        let mut of_slot: Vec<Option<u32>> = vec![None; slots];
+        let mut of_slot = vec![UNSEEN; slots];
         let mut source = vec![NONE; input.len()];
-        for (c, &w) in input.corner.iter().enumerate() {
-            let m = full.corner[self.polygons.as_ref().map_or(c, |p| p.corners[c] as usize)];
-            let of = *of_slot[slot[m as usize] as usize].get_or_insert(w);
-            if of != w {
+        let mut note = |c: usize, w: u32, m: u32| {
+            let of = &mut of_slot[slot[m as usize] as usize];
+            if *of == UNSEEN {
+                *of = w;
+            } else if *of != w {
                 self.corner_wedges.push((c as u32, w));
             }
             if w != NONE {
                 source[w as usize] = m;
             }
+        };
+        let corners = input.corner.iter().enumerate();
+        match &self.polygons {
+            None => corners.zip(&full.corner).for_each(|((c, &w), &m)| note(c, w, m)),
+            Some(p) => corners.zip(&p.corners).for_each(|((c, &w), &k)| note(c, w, full.corner[k as usize])),
         }
-        self.wedge = of_slot.into_iter().map(|w| w.unwrap_or(NONE)).collect();
+        self.wedge = of_slot.into_iter().map(|w| if w == UNSEEN { NONE } else { w }).collect();
         for (w, &m) in source.iter().enumerate() {
             let row = input.row(w as u32);
             let same = m != NONE

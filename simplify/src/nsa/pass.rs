@@ -3,7 +3,7 @@
 use super::turn::{MaxTurn, newell};
 use super::{Recorder, Step};
 use crate::locks::locked_vertices;
-use crate::log::{CollapseLog, note_wedges};
+use crate::log::{CollapseLog, Notes};
 use crate::options::{Options, Placement, Refused, SimplifyError};
 use crate::quadric::Quadric;
 use crate::validity::{MAX_VALENCE, RingFace, gather_ring};
@@ -34,7 +34,7 @@ pub(super) struct Engine<'m> {
     bound: f64,
     /// A collapse of the last pass was refused for the error bound.
     pub(super) bounded: bool,
-    /// Where collapses are written down, if they are.
+    /// Where collapses are written down, if they are: no recorder is told their wedges then.
     pub(super) log: Option<CollapseLog>,
     /// Triangles of the other meshes, for the log.
     elsewhere: usize,
@@ -328,14 +328,19 @@ impl<'m> Engine<'m> {
         error: f32,
         recorder: &mut Option<&mut dyn Recorder>,
     ) {
-        if recorder.is_some() {
-            self.note_wedges(e, roles);
-        }
-        if let Some(log) = &mut self.log {
-            log.note_wedges(self.work.mesh, e, roles.kept, roles.removed);
-        }
         if let Some(wedges) = &mut self.wedges {
-            wedges.merge(&mut self.work, e, roles, to);
+            let Scratch { corners, rows, values, .. } = &mut self.scratch;
+            corners.clear();
+            rows.clear();
+            values.clear();
+            let notes = match &mut self.log {
+                Some(log) => Some(log.notes()),
+                None => recorder.is_some().then_some(Notes { corners, rows, values }),
+            };
+            wedges.merge(&mut self.work, e, roles, to, notes);
+            if let Some(log) = self.log.as_mut().filter(|_| wedges.active()) {
+                log.end_run();
+            }
         }
         let (k, r) = (roles.kept.index(), roles.removed.index());
         let work = &mut self.work;
@@ -363,15 +368,5 @@ impl<'m> Engine<'m> {
             let Scratch { corners, rows, values, .. } = &self.scratch;
             recorder.step(&Step { collapse: Collapse { record, old_position }, corners, rows, values });
         }
-    }
-
-    /// Writes down the wedges that [`WedgeMerge::merge`] may change.
-    fn note_wedges(&mut self, e: EdgeId, roles: &Roles) {
-        let Scratch { corners, rows, values, .. } = &mut self.scratch;
-        corners.clear();
-        rows.clear();
-        values.clear();
-        let Some(wedges) = self.work.mesh.wedges() else { return };
-        note_wedges(self.work.mesh, wedges, e, (roles.kept, roles.removed), corners, rows, values);
     }
 }
