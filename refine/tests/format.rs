@@ -168,9 +168,10 @@ fn a_stream_in_single_bytes_brings_base_then_ever_finer_meshes() {
 #[test]
 fn chunks_are_read_alone_and_in_any_order() {
     let (meshes, turns) = several();
-    let options = EncodeOptions::default().with_chunk(Some(100));
+    // The order would turn the corners of faces.
+    let options = EncodeOptions::default().with_chunk(Some(100)).with_any_order(true);
     let bytes = encode(&meshes, &turns, &[], &options).unwrap();
-    let whole = decode(&encode(&meshes, &turns, &[], &options.with_any_order(true)).unwrap()).unwrap();
+    let whole = decode(&bytes).unwrap();
     let r = RangeReader::new(&bytes[..]).unwrap();
     let bases: Vec<_> = (0..3).map(|m| r.base(m).unwrap()).collect();
     for chunk in r.directory().chunks.iter().rev().filter(|c| c.kind == ChunkType::SPLITS) {

@@ -230,7 +230,8 @@ fn encode_mesh(
     let source = quantised.as_ref().unwrap_or(source);
     let layout =
         if options.sequential { Layout::sequential(options.chunk) } else { Layout::alone(options.chunk) };
-    let plan = Plan::new(source, layout)?;
+    let ordered = source.order.is_some() && !options.any_order;
+    let plan = Plan::new(source, if ordered { layout.before_order() } else { layout })?;
     let mut pm = source.reordered(&plan.order).ok()?;
     let tips = input_order::tips(&pm);
     input_order::turn(&mut pm, &tips, true);
