@@ -194,18 +194,17 @@ fn quantising_moves_vertices_by_no_more_than_it_says() {
 }
 
 #[test]
-fn chunks_for_random_access_bring_the_same_mesh() {
+fn chunks_that_follow_each_other_bring_the_same_mesh() {
     let p = Place::new();
     p.generate("cad", "in.ply", 3000);
     p.done("encode in.ply in.pm -q");
-    p.done("encode in.ply alone.pm -q --random-access");
-    assert!(p.read("in.pm") == p.read("alone.pm"));
     p.done("encode in.ply sequel.pm -q --sequential");
     p.done("decode in.pm a.ply -q");
     p.done("decode sequel.pm b.ply -q");
     assert!(p.read("a.ply") == p.read("b.ply"));
     assert!(p.read("sequel.pm").len() < p.read("in.pm").len());
-    p.run("encode in.ply out.pm --sequential --random-access").failed(2, "cannot be used with");
+    p.run("encode in.ply out.pm --sequential --paged").failed(2, "cannot be used with");
+    p.run("encode in.ply out.pm --bounds --paged").failed(2, "cannot be used with");
     for (threads, name) in [(1, "one.pm"), (2, "two.pm")] {
         p.done(&format!("encode in.ply {name} -q --threads {threads}"));
         assert!(p.read(name) == p.read("in.pm"), "{threads} threads");

@@ -182,7 +182,7 @@ fn visible_changes_morph_and_a_camera_that_stands_still_shows_what_it_would_with
 fn with_a_limit_of_memory_the_same_is_shown_of_fewer_bytes() {
     let p = place();
     p.generate("scan", "in.ply", 20_000);
-    p.done("encode in.ply in.pm --random-access --bounds --any-order -q");
+    p.done("encode in.ply in.pm --paged --any-order -q");
     p.done("extract in.pm whole.ply --camera cam.json -q");
     let r = p.done("extract in.pm paged.ply --camera cam.json --memory 64 --json -q").json();
     assert!(p.read("whole.ply") == p.read("paged.ply"));
@@ -212,14 +212,14 @@ fn what_cannot_be_read_in_parts_is_told() {
     let p = place();
     p.generate("scan", "in.ply", 20_000);
     p.done("encode in.ply plain.pm -q");
-    p.done("encode in.ply alone.pm --random-access -q");
-    p.done("encode in.ply in.pm --random-access --bounds -q");
+    p.done("encode in.ply bounded.pm --bounds -q");
+    p.done("encode in.ply in.pm --paged -q");
     let whole = p.read("in.pm");
     p.write("cut.pm", &whole[..whole.len() - 100]);
     for (arguments, code, says) in [
         ("extract in.ply out.ply --camera cam.json --memory 64", 2, "progmesh encode in.ply"),
-        ("extract plain.pm out.ply --camera cam.json --memory 64", 3, "--random-access --bounds"),
-        ("extract alone.pm out.ply --camera cam.json --memory 64", 3, "--random-access --bounds"),
+        ("extract plain.pm out.ply --camera cam.json --memory 64", 3, "--paged"),
+        ("extract bounded.pm out.ply --camera cam.json --memory 64", 3, "--paged"),
         ("extract cut.pm out.ply --camera cam.json --memory 64", 3, "shorter than it says"),
         ("extract in.pm out.ply --camera cam.json --memory 1", 3, "the limit of 1048576 bytes is too small"),
         ("extract in.pm out.ply --camera cam.json --memory 0", 2, "1 or more"),

@@ -739,7 +739,7 @@ fn selective_commands_print_one_object_with_the_documented_fields() {
         strips.mean_length > 2.0 && (strips.mean_length * strips.count as f64 - s.faces as f64).abs() < 1e-6
     );
     assert!(e.paging.is_none() && f.paging.is_none() && f.frames[0].fetched.is_none());
-    p.done("encode in.obj in.pm --random-access --bounds -q");
+    p.done("encode in.obj in.pm --paged -q");
     let g: Fly = serde_json::from_str(&of("fly in.pm --path circle --frames 2 --memory 32 --json")).unwrap();
     let paged = g.paging.unwrap();
     assert!(

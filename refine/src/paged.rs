@@ -43,9 +43,7 @@ pub enum PagedError {
     #[error("{0}")]
     Damage(#[from] Damage),
     /// The chunks cannot be read alone, or have no links beside them.
-    #[error(
-        "it was not written for refining out of core: write it with random access and bounds (`progmesh encode --random-access --bounds`)"
-    )]
+    #[error("it was not written for refining out of core: write it with pages (`progmesh encode --paged`)")]
     NoPages,
     /// Not even the coarsest mesh fits into the limit.
     #[error(

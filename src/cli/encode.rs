@@ -1,18 +1,17 @@
 //! `progmesh encode IN OUT.pm`.
 
+use super::Failure;
 use super::args::{self, Input};
 use super::common::{self, Warnings, short, thousands};
 use super::control::{Interrupt, Progress};
+use super::ending::PmEnding;
 use super::method::Making;
-use super::{Failure, common::print_json};
-use progmesh::io::files;
 use progmesh::io::pm::encode_progressive;
 use progmesh::pipeline::build_progressive;
 use progmesh::refine::format::{EncodeOptions, RangeReader};
 use progmesh::refine::hierarchy;
 use progmesh::simplify::Stop;
 use serde::Serialize;
-use std::path::PathBuf;
 use std::time::Instant;
 
 /// Write a mesh, or a whole scene, as a progressive mesh: a coarse base and the vertex splits that lead back to the input.
@@ -25,15 +24,12 @@ Examples:
   progmesh encode bunny.obj bunny.pm
   progmesh encode scan.ply scan.pm --placement endpoint --any-order
   progmesh encode dragon.ply dragon.pm --bounds
-  progmesh encode city.ply city.pm --random-access --bounds
+  progmesh encode city.ply city.pm --paged
   progmesh encode scene.glb scene.pm --quantize 14
   progmesh encode horse.ply horse.pm --method nsa --epsilon 12")]
 pub(crate) struct Args {
     #[command(flatten)]
     input: Input,
-    /// The file to write, .pm; - for standard output
-    #[arg(value_name = "OUT.pm")]
-    output: PathBuf,
     #[command(flatten)]
     making: Making,
     /// Move vertices onto a grid of 2^BITS cells along the longest side: smaller, but lossy (2 to 30)
@@ -45,20 +41,14 @@ pub(crate) struct Args {
     /// Chunks that follow each other, none readable without those before it: smaller by a tenth to a third
     #[arg(long, help_heading = "File")]
     sequential: bool,
-    /// Chunks that can be read alone, in any order, for views that load only what they need: the default; with --bounds also what
-    /// extract and fly need for --memory
-    #[arg(long, help_heading = "File", conflicts_with = "sequential")]
-    random_access: bool,
-    /// Measure and write what view-dependent refinement decides by, so that extract and fly begin at once: 5 to 7 bytes a vertex; with --random-access also what
-    /// extract and fly need for --memory
+    /// Measure and write what view-dependent refinement decides by, so that extract and fly begin at once: 5 to 7 bytes a vertex
     #[arg(long, help_heading = "File")]
     bounds: bool,
-    /// Print one JSON object about the run on standard output (see docs/json.md)
-    #[arg(long)]
-    json: bool,
-    /// Say nothing but errors
-    #[arg(long, short)]
-    quiet: bool,
+    /// Measure and write what extract and fly need for --memory: wider bounds than those of --bounds, and links between the chunks
+    #[arg(long, help_heading = "File", conflicts_with_all = ["sequential", "bounds"])]
+    paged: bool,
+    #[command(flatten)]
+    ending: PmEnding,
 }
 
 fn bits(text: &str) -> Result<u32, String> {
@@ -72,24 +62,15 @@ impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
         let job = self.making.job()?;
-        let out = common::name(&self.output, "standard output");
-        if self.json && files::is_dash(&self.output) {
-            return Err(Failure::Usage(
-                "--json and OUT both want standard output; write OUT to a path".into(),
-            ));
-        }
-        if self.output.extension().is_some_and(|e| !e.eq_ignore_ascii_case("pm")) {
-            return Err(Failure::Usage(format!("{out}: a progressive mesh's name must end in .pm")));
-        }
-        common::check_target(&self.output)?;
+        let out = self.ending.begin()?;
         let file = self.input.name();
-        let mut warnings = Warnings::new(self.quiet);
+        let mut warnings = Warnings::new(self.ending.quiet);
         let interrupt = Interrupt::watch();
         let report = common::in_pool(self.making.collapsing.threads, || {
             let scene = self.input.read(&mut warnings)?.decoded.scene;
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
-            let progress = Progress::new(&interrupt, self.quiet, "simplifying");
+            let progress = Progress::new(&interrupt, self.ending.quiet, "simplifying");
             let built = build_progressive(scene, &job, &progress)
                 .map_err(|e| Failure::Input(format!("{file}: {e}")))?;
             drop(progress);
@@ -99,9 +80,9 @@ impl Args {
             warnings.say(built.warnings.iter().map(|w| format!("{file}: {w}")));
             let mut built = built;
             let measuring = Instant::now();
-            if self.bounds {
+            if self.bounds || self.paged {
                 // Out of core, rings are not all at hand.
-                let options = match self.random_access {
+                let options = match self.paged {
                     true => hierarchy::Options::CUTS,
                     false => hierarchy::Options::RINGS,
                 };
@@ -119,15 +100,11 @@ impl Args {
                 .with_any_order(self.any_order)
                 .with_quantize(self.quantize)
                 .with_sequential(self.sequential)
-                .with_pages(self.random_access && self.bounds);
+                .with_pages(self.paged);
             let bytes = encode_progressive(&built.scene, &options)
                 .map_err(|e| Failure::Output(format!("{out}: {e}")))?;
             let encode = encoding.elapsed().as_secs_f64();
-            if interrupt.is_set() {
-                return Err(Failure::Interrupted);
-            }
-            let writing = Instant::now();
-            common::write_bytes(&self.output, &bytes)?;
+            let write = self.ending.write(&bytes, &interrupt)?;
             let scene = &built.scene;
             Ok(Report {
                 command: "encode",
@@ -147,17 +124,14 @@ impl Args {
                     simplify: built.simplify_seconds,
                     bounds,
                     encode,
-                    write: writing.elapsed().as_secs_f64(),
+                    write,
                     total: start.elapsed().as_secs_f64(),
                 },
                 warnings: vec![],
             })
         })?;
         let report = Report { warnings: warnings.all, ..report };
-        if !self.quiet {
-            common::note(&report.text(&file));
-        }
-        if self.json { print_json(&report) } else { Ok(()) }
+        self.ending.report(&report, || report.text(&file))
     }
 }
 

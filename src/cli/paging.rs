@@ -28,7 +28,7 @@ pub(crate) fn open(input: &Input, mib: usize) -> Result<PagedScene, Failure> {
     let file = input.name();
     let Some(path) = input.progressive_path() else {
         return Err(Failure::Usage(format!(
-            "{file}: --memory is for .pm files: write one first (progmesh encode {file} out.pm --random-access --bounds)"
+            "{file}: --memory is for .pm files: write one first (progmesh encode {file} out.pm --paged)"
         )));
     };
     let source = files::open(path).map_err(|e| Failure::Input(format!("{file}: {e}")))?;

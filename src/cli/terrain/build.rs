@@ -3,8 +3,9 @@
 use super::input::{GridInput, known_spacing};
 use crate::cli::Failure;
 use crate::cli::args;
-use crate::cli::common::{self, Warnings, print_json, short, thousands};
+use crate::cli::common::{self, Warnings, short, thousands};
 use crate::cli::control::{Interrupt, Progress};
+use crate::cli::ending::PmEnding;
 use progmesh::blocks::{self, BuildError, Built, Options};
 use progmesh::io::files::{self, WorkFolder};
 use progmesh::io::grid::GridFile;
@@ -31,9 +32,6 @@ Examples:
 pub(crate) struct Args {
     #[command(flatten)]
     input: GridInput,
-    /// The file to write, .pm
-    #[arg(value_name = "OUT.pm", required = true)]
-    output: PathBuf,
     /// At full detail no sample is farther than this from the mesh, vertically, in the grid's units; at 0 every sample is a vertex
     #[arg(long, value_name = "E", value_parser = args::not_negative, allow_negative_numbers = true,
           default_value_t = 0.0, help_heading = "Blocks")]
@@ -49,12 +47,8 @@ pub(crate) struct Args {
     /// Threads to use; the result does not depend on it [default: all]
     #[arg(long, value_name = "N", value_parser = args::threads, allow_negative_numbers = true)]
     threads: Option<usize>,
-    /// Print one JSON object about the run on standard output (see docs/json.md)
-    #[arg(long)]
-    json: bool,
-    /// Say nothing but errors
-    #[arg(long, short)]
-    quiet: bool,
+    #[command(flatten)]
+    ending: PmEnding,
 }
 
 fn side(text: &str) -> Result<usize, String> {
@@ -81,23 +75,19 @@ fn work_folder(output: &Path) -> PathBuf {
 impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
-        let out = self.output.display().to_string();
-        if files::is_dash(&self.output) {
+        if files::is_dash(self.ending.path()) {
             return Err(Failure::Usage(
                 "a progressive terrain is written to a file, not to standard output".into(),
             ));
         }
-        if !self.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("pm")) {
-            return Err(Failure::Usage(format!("{out}: a progressive mesh's name must end in .pm")));
-        }
-        common::check_target(&self.output)?;
+        let out = self.ending.begin()?;
         let file = self.input.name();
-        let mut warnings = Warnings::new(self.quiet);
+        let mut warnings = Warnings::new(self.ending.quiet);
         let interrupt = Interrupt::watch();
         let report = common::in_pool(self.threads, || {
             let source = self.input.open(&mut warnings)?;
             let read = start.elapsed().as_secs_f64();
-            let path = work_folder(&self.output);
+            let path = work_folder(self.ending.path());
             let in_folder = |e| Failure::Output(format!("{}: {e}", path.display()));
             let belongs = self.belongs(&source)?;
             let folder = WorkFolder::open(&path, &belongs).map_err(in_folder)?;
@@ -107,10 +97,10 @@ impl Args {
                 .with_cells(self.block)
                 .with_memory(self.memory << 20)
                 .with_spacing(spacing(&source));
-            let progress = Progress::new(&interrupt, self.quiet, "building");
+            let progress = Progress::new(&interrupt, self.ending.quiet, "building");
             let building = Instant::now();
             let built = blocks::build(&*source.raster, &options, &folder, &Watch(&progress))
-                .map_err(|e| failure(&file, &path, self.quiet, &e))?;
+                .map_err(|e| failure(&file, &path, self.ending.quiet, &e))?;
             drop(progress);
             let build = building.elapsed().as_secs_f64();
             let encoding = Instant::now();
@@ -118,11 +108,7 @@ impl Args {
             let bytes =
                 encode_terrain(&built, &terrain).map_err(|e| Failure::Output(format!("{out}: {e}")))?;
             let encode = encoding.elapsed().as_secs_f64();
-            if interrupt.is_set() {
-                return Err(Failure::Interrupted);
-            }
-            let writing = Instant::now();
-            common::write_bytes(&self.output, &bytes)?;
+            let write = self.ending.write(&bytes, &interrupt)?;
             folder.remove().map_err(in_folder)?;
             Ok(Report {
                 command: "terrain build",
@@ -141,21 +127,12 @@ impl Args {
                 splits: built.mesh.splits.len(),
                 bytes: bytes.len(),
                 peak_bytes: files::peak_bytes(),
-                seconds: Seconds {
-                    read,
-                    build,
-                    encode,
-                    write: writing.elapsed().as_secs_f64(),
-                    total: start.elapsed().as_secs_f64(),
-                },
+                seconds: Seconds { read, build, encode, write, total: start.elapsed().as_secs_f64() },
                 warnings: vec![],
             })
         })?;
         let report = Report { warnings: warnings.all, ..report };
-        if !self.quiet {
-            common::note(&report.text());
-        }
-        if self.json { print_json(&report) } else { Ok(()) }
+        self.ending.report(&report, || report.text())
     }
 
     /// What finished blocks belong to: grid, options that change them, and this version.
