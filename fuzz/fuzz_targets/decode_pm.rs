@@ -1,38 +1,71 @@
-//! Reads any bytes as a progressive mesh: what comes out can be refined and coarsened, and written again. Once as they are, once with the checksums set right, which
-//! lets changes through to the streams.
+//! Reads any bytes as a progressive mesh: what comes out can be refined and coarsened, and written again. Mostly with the checksums set right, which
+//! lets changes through to the streams. What the bytes are decides which way they are read, so that a run is short and every way has its turn.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use progmesh_refine::ProgressiveMesh;
 use progmesh_refine::format::{EncodeOptions, PmReader, RangeReader, decode_prefix, encode};
 
+/// Meshes of more splits are not written again.
+const WRITTEN: usize = 64;
+
 fuzz_target!(|bytes: &[u8]| {
-    read(bytes);
-    if let Some(signed) = signed(bytes) {
-        read(&signed);
+    let turn = crc32fast::hash(bytes);
+    match signed(bytes) {
+        Some(signed) if turn & 7 != 0 => read(&signed, turn >> 3),
+        _ => read(bytes, turn >> 3),
     }
 });
 
-fn read(bytes: &[u8]) {
+fn read(bytes: &[u8], turn: u32) {
+    match turn & 7 {
+        0 | 1 => in_a_stream(bytes),
+        2 | 3 => alone(bytes),
+        _ => whole(bytes, turn >> 3),
+    }
+}
+
+fn whole(bytes: &[u8], turn: u32) {
     let Ok(decoded) = decode_prefix(bytes) else { return };
     for pm in &decoded.meshes {
         let Ok(mut cursor) = pm.cursor() else { continue };
         let whole = cursor.seek(usize::MAX).is_ok();
         let _ = cursor.to_ordered_input();
         let _ = cursor.seek(0);
-        if whole {
-            for options in [EncodeOptions::default(), EncodeOptions::default().with_chunk(Some(5))] {
-                let _ = encode(std::slice::from_ref(pm), &[], &[], &options);
-            }
+        if whole && pm.splits.len() <= WRITTEN {
+            write(pm, turn);
         }
     }
+}
+
+fn write(pm: &ProgressiveMesh, turn: u32) {
+    let options = match turn & 3 {
+        0 => EncodeOptions::default(),
+        1 => EncodeOptions::default().with_chunk(Some(5)),
+        2 => EncodeOptions::default().with_sequential(true).with_any_order(true),
+        _ => EncodeOptions::default().with_quantize(Some(6)),
+    };
+    let Ok(bytes) = encode(std::slice::from_ref(pm), &[], &[], &options) else { return };
+    let read = decode_prefix(&bytes).expect("what was written can be read");
+    assert!(read.report.damage.is_none());
+}
+
+fn in_a_stream(bytes: &[u8]) {
     let Ok(mut reader) = PmReader::new(bytes) else { return };
     while let Ok(Some(_)) = reader.advance() {}
-    assert!(reader.finish().meshes.len() <= decoded.meshes.len());
-    // Chunks alone, the last first.
+    for pm in &reader.finish().meshes {
+        let _ = pm.cursor().map(|mut c| c.seek(usize::MAX).is_ok());
+    }
+}
+
+/// Chunks by themselves, the last first.
+fn alone(bytes: &[u8]) {
     let Ok(reader) = RangeReader::new(bytes) else { return };
-    for chunk in reader.directory().chunks.iter().rev() {
-        let head = reader.base(chunk.mesh).ok().map(|(head, _)| head);
-        let _ = reader.read(chunk.index, head.as_ref());
+    let directory = reader.directory();
+    let heads: Vec<_> = (0..directory.meshes.min(8)).map(|m| reader.base(m).ok().map(|b| b.0)).collect();
+    for chunk in directory.chunks.iter().rev() {
+        let head = heads.get(chunk.mesh as usize).and_then(Option::as_ref);
+        let _ = reader.read(chunk.index, head);
     }
 }
 
