@@ -1,7 +1,7 @@
 //! A document for a scene that came from another format.
 
-use super::encode::{Placed, Writer};
 use super::geometry::{self, Shape};
+use super::writer::{Placed, Writer};
 use super::{images, semantic};
 use crate::aif::Positions;
 use crate::io::EncodeError;

@@ -1,7 +1,7 @@
 //! From a scene's mesh to glTF primitives: one for each group and material, each (vertex, wedge) pair once.
 
-use super::encode::Writer;
 use super::semantic;
+use super::writer::Writer;
 use crate::aif::{Encoding, NONE, Positions, Semantic, Wedges, triangulate_polygon};
 use crate::io::EncodeError;
 use crate::scene::SceneMesh;

@@ -2,8 +2,8 @@
 
 use super::accessor::Store;
 use super::container::{data_uri, is_remote, load, percent};
-use super::encode::{Writer, percent_encode};
 use super::json::{At, array_of};
+use super::writer::{Writer, percent_encode};
 use crate::io::{DecodeError, Side, obj};
 use crate::scene::{Image, Material, Scene};
 use serde_json::{Map, Value, json};

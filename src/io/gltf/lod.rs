@@ -4,8 +4,9 @@
 //! belong to no scene, so that a viewer without the extension shows the finest level and nothing else. `MSFT_screencoverage` in the node's
 //! extras says down to which part of the screen each level is for; a last 0 lets the coarsest stay however small it becomes.
 
-use super::encode::{Writer, add_level, begin};
+use super::encode::{add_level, begin};
 use super::json::array_mut;
+use super::writer::Writer;
 use crate::io::{EncodeError, EncodeOptions, Encoded, Format};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};

@@ -33,6 +33,7 @@ mod meshopt;
 mod semantic;
 mod source;
 mod vertices;
+mod writer;
 
 pub use decode::decode;
 pub use encode::encode;

@@ -1,0 +1,225 @@
+//! `extract` and `fly`.
+
+use crate::common::Place;
+use crate::present;
+use crate::terrain::terrain;
+use serde::Deserialize;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Extract {
+    command: String,
+    to: String,
+    #[serde(deserialize_with = "present")]
+    tau: Option<f64>,
+    faces: usize,
+    vertices: usize,
+    splits: usize,
+    full_faces: usize,
+    full_splits: usize,
+    visible_vertices: usize,
+    #[serde(deserialize_with = "present")]
+    strips: Option<ExtractStrips>,
+    #[serde(deserialize_with = "present")]
+    paging: Option<Paging>,
+    seconds: ExtractSeconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ExtractStrips {
+    count: usize,
+    mean_length: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Paging {
+    limit_bytes: u64,
+    most_bytes: u64,
+    file_bytes: u64,
+    bytes_read: u64,
+    bytes_touched: u64,
+    requests: u64,
+    chunks: u64,
+    chunks_touched: u64,
+    chunks_decoded: u64,
+    evictions: u64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ExtractSeconds {
+    read: f64,
+    bounds: f64,
+    refine: f64,
+    write: f64,
+    total: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Fly {
+    command: String,
+    path: String,
+    #[serde(deserialize_with = "present")]
+    tau: Option<f64>,
+    full_faces: usize,
+    frame_count: usize,
+    faces: FlyStatistics,
+    vsplits: FlyStatistics,
+    ecols: FlyStatistics,
+    us: FlyStatistics,
+    morphing: FlyStatistics,
+    dirty_index_bytes: FlyStatistics,
+    #[serde(deserialize_with = "present")]
+    operations_per_second: Option<f64>,
+    #[serde(deserialize_with = "present")]
+    measured_over_tau: Option<FlyStatistics>,
+    above: usize,
+    #[serde(deserialize_with = "present")]
+    cracks: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    folds: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    uncovered: Option<usize>,
+    memory: FlyMemory,
+    #[serde(deserialize_with = "present")]
+    paging: Option<Paging>,
+    frames: Vec<FlyFrame>,
+    seconds: FlySeconds,
+    warnings: Vec<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlyStatistics {
+    mean: f64,
+    p50: f64,
+    p99: f64,
+    max: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlyMemory {
+    shared_bytes: usize,
+    shared_bytes_per_vertex: f64,
+    view_bytes: usize,
+    view_table_bytes: usize,
+    most_vertices: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlyFrame {
+    faces: usize,
+    vertices: usize,
+    vsplits: usize,
+    ecols: usize,
+    us: f64,
+    #[serde(deserialize_with = "present")]
+    tau: Option<f64>,
+    complete: bool,
+    morphing: usize,
+    visible_vertices: usize,
+    dirty_index_bytes: usize,
+    dirty_wedges: usize,
+    #[serde(deserialize_with = "present")]
+    fetched: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    no_room: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    measured: Option<FlyMeasured>,
+    #[serde(deserialize_with = "present")]
+    on_ground: Option<FlyOnGround>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlyOnGround {
+    samples: usize,
+    max_pixels: f64,
+    mean_pixels: f64,
+    max_height: f64,
+    uncovered: usize,
+    cracks: usize,
+    folds: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlyMeasured {
+    samples: usize,
+    max_pixels: f64,
+    mean_pixels: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlySeconds {
+    read: f64,
+    bounds: f64,
+}
+
+#[test]
+fn selective_commands_print_one_object_with_the_documented_fields() {
+    let p = Place::new();
+    p.generate("torus", "in.obj", 600);
+    p.write(
+        "cam.json",
+        r#"{"eye": [0, 1, 6], "target": [0, 0, 0], "up": [0, 1, 0], "fov_y_deg": 45, "width": 640, "height": 480,
+            "near": 0.1, "far": 100}"#,
+    );
+    let of = |arguments: &str| p.done(arguments).stdout;
+    let e: Extract =
+        serde_json::from_str(&of("extract in.obj out.ply --camera cam.json --tau 2 --json")).unwrap();
+    assert_eq!((e.command.as_str(), e.to.as_str(), e.tau), ("extract", "ply", Some(2.0)));
+    assert!(e.faces <= e.full_faces && e.splits <= e.full_splits && e.visible_vertices <= e.vertices);
+    let f: Fly = serde_json::from_str(&of(
+        "fly in.obj --path circle --frames 4 --measure-every 2 --samples 500 --json",
+    ))
+    .unwrap();
+    assert_eq!((f.command.as_str(), f.frame_count, f.frames.len(), f.above), ("fly", 4, 4, 0));
+    assert!(f.frames.iter().all(|f| f.morphing == 0) && f.morphing.max == 0.0);
+    assert!(
+        f.cracks.is_none()
+            && f.folds.is_none()
+            && f.uncovered.is_none()
+            && f.frames.iter().all(|f| f.on_ground.is_none())
+    );
+    p.done("generate terrain grid.tif --size 33 --seed 1 -q");
+    p.done("terrain tin grid.tif mesh.ply --max-error 0.5 --on-samples -q");
+    let g: Fly = serde_json::from_str(&of(
+        "fly mesh.ply --grid grid.tif --path circle --frames 2 --measure-every 1 --tau 0 --cull none --placement endpoint --lock-border --json",
+    ))
+    .unwrap();
+    let judged = g.frames[1].on_ground.as_ref().unwrap();
+    assert!(judged.samples > 0 && judged.mean_pixels <= judged.max_pixels && judged.max_height >= 0.0);
+    assert_eq!((judged.uncovered, judged.cracks, judged.folds), (0, 0, 0));
+    assert_eq!((g.cracks, g.folds, g.uncovered), (Some(0), Some(0), Some(0)));
+    assert!(e.strips.is_none());
+    let s: Extract =
+        serde_json::from_str(&of("extract in.obj out.ply --camera cam.json --tau 2 --strips --json"))
+            .unwrap();
+    let strips = s.strips.unwrap();
+    assert!(
+        strips.mean_length > 2.0 && (strips.mean_length * strips.count as f64 - s.faces as f64).abs() < 1e-6
+    );
+    assert!(e.paging.is_none() && f.paging.is_none() && f.frames[0].fetched.is_none());
+    p.done("encode in.obj in.pm --paged -q");
+    let g: Fly = serde_json::from_str(&of("fly in.pm --path circle --frames 2 --memory 32 --json")).unwrap();
+    let paged = g.paging.unwrap();
+    assert!(
+        paged.most_bytes <= paged.limit_bytes
+            && paged.bytes_touched <= paged.bytes_read.min(paged.file_bytes)
+    );
+    assert!(
+        paged.chunks_touched <= paged.chunks.min(paged.chunks_decoded)
+            && paged.requests >= paged.chunks_decoded
+    );
+    assert!(paged.evictions <= paged.chunks_decoded);
+    assert!(g.frames.iter().all(|f| f.fetched.is_some() && f.no_room == Some(0)));
+    assert!(f.frames[2].measured.as_ref().is_some_and(|m| m.samples > 100) && f.frames[1].measured.is_none());
+}
