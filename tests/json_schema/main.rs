@@ -11,13 +11,15 @@ mod simplify;
 mod terrain;
 mod views;
 
-use common::Place;
-use serde::Deserialize;
 use crate::terrain::{BUILD, TERRAIN, terrain};
 use crate::views::CAMERA;
+use common::Place;
+use serde::Deserialize;
 
 /// An optional value whose key must be there all the same.
-pub(crate) fn present<'de, D: serde::Deserializer<'de>, T: Deserialize<'de>>(d: D) -> Result<Option<T>, D::Error> {
+pub(crate) fn present<'de, D: serde::Deserializer<'de>, T: Deserialize<'de>>(
+    d: D,
+) -> Result<Option<T>, D::Error> {
     Option::deserialize(d)
 }
 

@@ -2,7 +2,6 @@
 
 use crate::common::Place;
 use crate::present;
-use crate::terrain::terrain;
 use serde::Deserialize;
 
 #[derive(Deserialize)]

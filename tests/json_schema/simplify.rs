@@ -109,7 +109,7 @@ pub(crate) struct Info {
     materials: Vec<String>,
     images: Vec<Image>,
     #[serde(deserialize_with = "present")]
-    progressive: Option<Progressive>,
+    pub(crate) progressive: Option<Progressive>,
     #[serde(deserialize_with = "present")]
     check: Option<String>,
     warnings: Vec<String>,
@@ -117,21 +117,21 @@ pub(crate) struct Info {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Progressive {
+pub(crate) struct Progressive {
     base_triangles: usize,
-    splits: usize,
+    pub(crate) splits: usize,
     levels: usize,
     #[serde(deserialize_with = "present")]
     chunks: Option<usize>,
     #[serde(deserialize_with = "present")]
     quantization_error: Option<f64>,
     #[serde(deserialize_with = "present")]
-    streams: Option<Streams>,
+    pub(crate) streams: Option<Streams>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Streams {
+pub(crate) struct Streams {
     head: u64,
     base: u64,
     connectivity: u64,

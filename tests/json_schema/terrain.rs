@@ -170,7 +170,8 @@ fn terrain_build() {
 }
 
 /// Twelve columns and ten rows of 8-bit heights.
-pub(crate) const TERRAIN: &str = "terrain tin grid.raw out.glb --size 12x10 --type u8 --max-error 3 --verify --json";
+pub(crate) const TERRAIN: &str =
+    "terrain tin grid.raw out.glb --size 12x10 --type u8 --max-error 3 --verify --json";
 
 pub(crate) fn terrain(p: &Place) {
     p.write("grid.raw", (0..120u32).map(|i| (i * i % 37) as u8).collect::<Vec<_>>());
