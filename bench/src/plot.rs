@@ -59,7 +59,7 @@ const HEIGHT: f64 = 320.0;
 const LEFT: f64 = 66.0;
 const TOP: f64 = 34.0;
 const BOTTOM: f64 = 48.0;
-const LEGEND: f64 = 330.0;
+const LEGEND: f64 = 370.0;
 const LINE: f64 = 19.0;
 
 /// The panels as one picture, white behind, with a legend on the right. Points that are not positive and finite are left out.
