@@ -227,6 +227,15 @@ impl Splits {
     pub fn is_empty(&self) -> bool {
         self.vertex.is_empty()
     }
+
+    /// Room for so many more.
+    pub(crate) fn reserve(&mut self, splits: usize) {
+        self.vertex.reserve_exact(splits);
+        self.left.reserve_exact(splits);
+        self.right.reserve_exact(splits);
+        self.code.reserve_exact(splits);
+        self.error.reserve_exact(splits);
+    }
 }
 
 /// Attributes of the base and of the splits.

@@ -528,6 +528,26 @@ fn every_file_of_the_corpus_and_every_truncation_is_survived() {
     assert!(files >= 3 && whole >= 3, "{files} files, {whole} whole");
 }
 
+/// Seeds for [`every_file_of_the_corpus_and_every_truncation_is_survived`]: what the format can hold, in files as small as can be.
+#[test]
+#[ignore = "writes tests/corpus anew, when the format has changed: what fuzzing found there does not come back"]
+fn the_corpus_is_written_anew() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
+    let small = EncodeOptions::default().with_chunk(Some(8));
+    let write = |name: &str, bytes: Vec<u8>| std::fs::write(folder.join(name), bytes).unwrap();
+    let grid = build(sample("terrain", 50, 1), &runs()[0], &Quiet).unwrap().mesh;
+    write("grid.pm", one(&grid, &small));
+    write("grid_quantised.pm", one(&grid, &small.clone().with_quantize(Some(8)).with_any_order(true)));
+    write("grid_sequential.pm", one(&grid, &small.clone().with_sequential(true)));
+    write("grid_whole.pm", one(&grid, &EncodeOptions::default()));
+    let seams = build(sample("cad", 60, 1), &runs()[1], &Quiet).unwrap().mesh;
+    write("seams.pm", one(&seams, &small));
+    write("seams_sequential.pm", one(&seams, &small.clone().with_sequential(true)));
+    let two = vec![sample("quad-sphere", 30, 1), sample("polygons", 30, 2)];
+    let two = build_all(two, &[1.0, 2.0], &Options::default(), &Quiet).unwrap();
+    write("two_and_scene.pm", encode(&two.meshes, &two.turns, b"scene", &small).unwrap());
+}
+
 /// The meshes of [`several`] with bounds: measured, and given.
 fn bounded() -> (Vec<ProgressiveMesh>, Vec<u32>) {
     let (mut meshes, turns) = several();

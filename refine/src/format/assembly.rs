@@ -4,6 +4,7 @@ use super::base::MeshHead;
 use super::codec::{self, Sequel};
 use super::container::{Chunk, ChunkType, Directory, FormatError};
 use super::input_order;
+use super::places;
 use super::read::Piece;
 use super::splits::{self, SplitBlock};
 use crate::hierarchy::Bounds;
@@ -75,6 +76,26 @@ impl Assembly {
     /// Mesh `m` so far, once its base was added.
     pub fn mesh(&self, m: u32) -> Option<&ProgressiveMesh> {
         self.meshes.get(m as usize)?.as_ref().map(|p| &p.mesh)
+    }
+
+    /// Room for what was read already.
+    pub(super) fn reserve<'a>(&mut self, blocks: impl Iterator<Item = (u32, &'a SplitBlock)>) {
+        let mut counts = vec![(0, 0); self.meshes.len()];
+        for (m, block) in blocks {
+            if let Some((splits, moved)) = counts.get_mut(m as usize) {
+                *splits += block.splits.len();
+                *moved += block.moved_positions.len();
+            }
+        }
+        self.turns.reserve_exact(counts.iter().map(|c| c.0).sum());
+        for (part, (splits, moved)) in self.meshes.iter_mut().zip(counts) {
+            if let Some(part) = part {
+                let pm = &mut part.mesh;
+                pm.splits.reserve(splits);
+                places::reserve(&mut pm.new_positions, splits);
+                places::reserve(&mut pm.moved_positions, moved);
+            }
+        }
     }
 
     /// Adds what a chunk held. Chunks of a mesh must come in their order.

@@ -47,6 +47,36 @@ const ATTRIBUTES: u8 = 2;
 const MATERIALS: u8 = 4;
 const GROUPS: u8 = 8;
 
+/// Tells which splits make one face only, asked in ascending order.
+pub(super) struct Singles<'a> {
+    of: &'a [u32],
+    so_far: usize,
+}
+
+impl<'a> Singles<'a> {
+    pub(super) fn new(head: &'a MeshHead) -> Self {
+        Singles { of: &head.single, so_far: 0 }
+    }
+
+    /// Split `i` does.
+    #[inline]
+    pub(super) fn is(&mut self, i: u32) -> bool {
+        let rest = &self.of[self.so_far..];
+        if rest.first().is_some_and(|&s| s < i) {
+            self.so_far += rest.partition_point(|&s| s < i);
+        }
+        let is = self.of.get(self.so_far) == Some(&i);
+        self.so_far += is as usize;
+        is
+    }
+
+    /// How many do up to the last that was asked for.
+    #[inline]
+    pub(super) fn so_far(&self) -> u32 {
+        self.so_far as u32
+    }
+}
+
 impl MeshHead {
     /// The first face that split `i` makes. O(log n).
     pub fn first_face(&self, i: u32) -> u32 {

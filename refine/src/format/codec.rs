@@ -13,17 +13,20 @@ pub(super) use self::context::{Sources, Start};
 use self::cuts::Cuts;
 pub(super) use self::cuts::Wanted;
 use self::sweep::NEW;
-use super::base::MeshHead;
+use super::base::{MeshHead, Singles};
 use super::coder::{Bit, Coder, Decoder, Encoder, Nibble, Number, put_varint, take_varint};
 use super::extras::Extras;
 use super::places;
 use super::residual::Residuals;
 use super::splits::{
-    CONNECTIVITY, Counts, ERROR_SHIFT, ERRORS, PLACES, STREAMS, Source, SplitBlock, error_level,
+    CONNECTIVITY, Counts, ERROR_SHIFT, ERRORS, MOST_LEVEL, PLACES, STREAMS, Source, SplitBlock, error_level,
 };
 use super::walk::{Cut, NO_LEVEL, Ring, Walk, cut};
 use crate::aif::NONE;
 use crate::progressive::{ProgressiveMesh, SplitCode};
+
+/// Levels above the least of the chunk that are told apart.
+const TOPS: usize = 12;
 
 /// Valences told apart.
 const VALENCES: usize = 10;
@@ -44,10 +47,9 @@ struct Models {
     moves: Bit,
     named: [Number; 2],
     inner: [Bit; 3],
-    rank: [[Nibble; VALENCES]; 3],
-    count: [Nibble; VALENCES],
-    far: Number,
-    error: [Nibble; 12],
+    left: cuts::Left,
+    right: cuts::Right,
+    error: [Nibble; TOPS],
     error_far: Number,
     context: context::Models,
 }
@@ -80,8 +82,7 @@ struct Codec<'a> {
     list: Vec<u32>,
     /// Something was split in this sweep.
     moved: bool,
-    /// The first vertex made since the sweeps began, and how often those made are to be split (writer).
-    begins: usize,
+    /// How often each vertex is still to be split (writer).
     to_come: Vec<u32>,
     /// Splits that only prepare for those of the chunk.
     preparing: bool,
@@ -90,6 +91,7 @@ struct Codec<'a> {
     levels: [u16; 2],
     /// The next split.
     split: u32,
+    singles: Singles<'a>,
     /// What is known of older splits, in a chunk that is read alone.
     known: Option<Known>,
 }
@@ -108,12 +110,12 @@ impl<'a> Codec<'a> {
             pass: Vec::new(),
             list: Vec::new(),
             moved: true,
-            begins: 0,
             to_come: Vec::new(),
             preparing: false,
             rest: 0,
             levels: [0; 2],
             split: first.split as u32,
+            singles: Singles::new(head),
         }
     }
 
@@ -126,28 +128,28 @@ impl<'a> Codec<'a> {
     ) -> Option<()> {
         let wanted = source.as_ref().map(|s| s.wanted());
         let (v, state) = self.sweep(&mut c[CONNECTIVITY], wanted.map_or(NONE, |w| w.vertex))?;
-        let level = source.as_ref().map_or(0, |s| error_level(s.pm.splits.error[s.at.split]) as u16);
-        let level = self.level(&mut c[ERRORS], self.walk.vertices[v as usize].level, level)?;
-        let two = !self.head.is_single(self.split);
+        let two = !self.singles.is(self.split);
         let (code, cuts) = self.cuts(&mut c[CONNECTIVITY], (v, state), two, wanted)?;
         // Places.
         let guess = self.guess(v, &cuts, code.moves());
+        let level = source.as_ref().map_or(0, |s| error_level(s.pm.splits.error[s.at.split]) as u16);
+        let level = self.level(&mut c[ERRORS], v, level)?;
         let place = source.as_ref().map_or([0.0; 3], |s| places::point(&s.pm.new_positions, s.at.split));
-        let place = self.residuals.code(&mut c[PLACES], code.moves() as usize, &guess, place);
+        let place = self.residuals.code(&mut c[PLACES], code.moves() as usize, (&guess, level), place);
         let mut moved = None;
         if code.moves() {
             let to = source.as_ref().map_or([0.0; 3], |s| places::point(&s.pm.moved_positions, s.at.moved));
             let guess = self.guess_moved(v, &cuts, &guess);
-            moved = Some(self.residuals.code(&mut c[PLACES], 2, &guess, to));
+            moved = Some(self.residuals.code(&mut c[PLACES], 2, (&guess, level), to));
         }
         if C::READS {
             let name = |c: Cut| {
                 let c = cut(c.name().0);
-                self.known.as_ref().map_or(Some(c), |k| k.cut(self.head, c))
+                self.known.as_ref().map_or(c, |k| k.cut(c))
             };
             out.splits.vertex.push(self.known.as_ref().map_or(v, |k| k.vertex(v)));
-            out.splits.left.push(name(cuts.left)?);
-            out.splits.right.push(if two { name(cuts.right)? } else { NONE });
+            out.splits.left.push(name(cuts.left));
+            out.splits.right.push(if two { name(cuts.right) } else { NONE });
             out.splits.code.push(code);
             out.splits.error.push(f32::from_bits((level as u32) << ERROR_SHIFT));
             places::push(&mut out.new_positions, place);
@@ -167,17 +169,16 @@ impl<'a> Codec<'a> {
     fn apply(&mut self, v: u32, cuts: &Cuts, code: SplitCode, made: ([f64; 3], u16)) {
         let u = self.walk.vertices.len();
         self.walk.split(v, &self.ring, (cuts.first, cuts.count), code, made);
-        let new = &mut self.walk.vertices[u];
-        new.visit = NEW;
-        new.to_come = self.to_come.get(u - self.begins).copied().unwrap_or(0);
-        self.pass.push(u as u32);
-        self.pass.push(v);
+        self.walk.vertices[u].visit = NEW;
+        self.list.extend([v, u as u32]);
     }
 
     /// A level of error: mostly a little below that of the split before at the vertex.
-    fn level<C: Coder>(&mut self, c: &mut C, before: u16, level: u16) -> Option<u16> {
-        let top = before.min(self.levels[1]);
-        let model = &mut self.m.error[(top.saturating_sub(self.levels[0]) as usize).min(11)];
+    #[inline]
+    fn level<C: Coder>(&mut self, c: &mut C, v: u32, level: u16) -> Option<u16> {
+        let [least, most] = self.levels;
+        let top = self.walk.vertices[v as usize].level.min(most);
+        let model = &mut self.m.error[(top.saturating_sub(least) as usize).min(TOPS - 1)];
         let down = top.wrapping_sub(level).min(15) as u32;
         let down = c.nibble(model, down) as u16;
         let level = if down < 15 {
@@ -185,7 +186,7 @@ impl<'a> Codec<'a> {
         } else {
             c.number(&mut self.m.error_far, level as u64).try_into().ok()?
         };
-        Some(level).filter(|&l| l <= 0x3FC)
+        Some(level).filter(|&l| l <= MOST_LEVEL)
     }
 }
 

@@ -200,7 +200,7 @@ impl<'a> Decoder<'a> {
         Some(d)
     }
 
-    #[inline]
+    #[inline(always)]
     fn word(&mut self) -> u32 {
         let word = match self.bytes.get(self.at..self.at + 2) {
             Some(b) => u16::from_le_bytes([b[0], b[1]]) as u32,
@@ -213,8 +213,25 @@ impl<'a> Decoder<'a> {
         word
     }
 
+    /// Four more bytes of plain bits, of which `bits` are wanted.
+    fn refill(&mut self, bits: u32) {
+        let next = match self.plain.get(self.plain_at..self.plain_at + 4) {
+            Some(b) => [b[0], b[1], b[2], b[3]],
+            None => {
+                let rest = self.plain.get(self.plain_at..).unwrap_or_default();
+                self.short |= (rest.len() as u32) * 8 + self.filled < bits;
+                let mut four = [0; 4];
+                four[..rest.len()].copy_from_slice(rest);
+                four
+            }
+        };
+        self.plain_at += 4;
+        self.window |= (u32::from_le_bytes(next) as u64) << self.filled;
+        self.filled += 32;
+    }
+
     /// Takes a decision's share out of the state.
-    #[inline]
+    #[inline(always)]
     fn take(&mut self, (start, size): (u32, u32)) {
         self.state = size * (self.state >> PRECISION) + (self.state & (TOTAL - 1)) - start;
         if self.state < LEAST {
@@ -243,22 +260,10 @@ impl Coder for Decoder<'_> {
         symbol as u32
     }
 
-    #[inline]
+    #[inline(always)]
     fn plain(&mut self, bits: u32, _: u32) -> u32 {
         if self.filled < bits {
-            let next = match self.plain.get(self.plain_at..self.plain_at + 4) {
-                Some(b) => [b[0], b[1], b[2], b[3]],
-                None => {
-                    let rest = self.plain.get(self.plain_at..).unwrap_or_default();
-                    self.short |= (rest.len() as u32) * 8 + self.filled < bits;
-                    let mut four = [0; 4];
-                    four[..rest.len()].copy_from_slice(rest);
-                    four
-                }
-            };
-            self.plain_at += 4;
-            self.window |= (u32::from_le_bytes(next) as u64) << self.filled;
-            self.filled += 32;
+            self.refill(bits);
         }
         let value = (self.window & low_mask(bits)) as u32;
         self.window >>= bits;

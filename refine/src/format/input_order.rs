@@ -1,8 +1,31 @@
 //! The chunk with the input's numbering: read after all splits of its mesh, and coded against them.
 
 use super::coder::{Bit, Coder, Decoder, Encoder, Number};
+use super::{places, plan};
 use crate::aif::NONE;
 use crate::progressive::{InputOrder, Polygons, ProgressiveMesh, SplitCode};
+
+/// Numbers the vertices of the base along a curve through space, so that each is near the one before: what the numbering of a mesh whose order is not kept should be. With
+/// attributes nothing is done: wedges are near each other by the numbers of vertices.
+pub(super) fn sort_base(pm: &mut ProgressiveMesh) {
+    if pm.wedges.is_some() {
+        return;
+    }
+    let order = plan::base_order(pm);
+    let mut number = vec![0; order.len()];
+    let mut positions = places::empty(pm.base_positions.is_f64());
+    for (&v, k) in order.iter().zip(0u32..) {
+        number[v as usize] = k;
+        places::push(&mut positions, places::point(&pm.base_positions, v as usize));
+    }
+    pm.base_positions = positions;
+    let all = pm.base_faces.as_flattened_mut().iter_mut();
+    for v in all.chain(pm.wires.as_flattened_mut()).chain(&mut pm.splits.vertex) {
+        if let Some(&k) = number.get(*v as usize) {
+            *v = k;
+        }
+    }
+}
 
 /// Where the tips of the faces that splits make are among their corners: 0..3 each, by face, base faces left out.
 pub(super) fn tips(pm: &ProgressiveMesh) -> Vec<u8> {

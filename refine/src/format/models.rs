@@ -5,35 +5,49 @@ pub(super) const PRECISION: u32 = 15;
 /// All shares together.
 pub(super) const TOTAL: u32 = 1 << PRECISION;
 
-/// How probable it is that the next bit is 0, as two estimates, one that learns fast and one that learns slowly; their mean counts.
+/// How probable it is that the next bit is 0, of [`TOTAL`]; learned fast at first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bit {
-    fast: u16,
-    slow: u16,
+    zero: u16,
+    seen: u16,
 }
 
 impl Default for Bit {
     fn default() -> Self {
-        Bit { fast: 1 << (PRECISION - 1), slow: 1 << (PRECISION - 1) }
+        Bit { zero: 1 << (PRECISION - 1), seen: 0 }
     }
 }
 
+/// Where estimates end, by what came.
+const ENDS: [i32; 2] = [TOTAL as i32 - 32, 32];
+
+/// So many are counted.
+const SEEN: u16 = 126;
+
+/// How slowly a [`Bit`] learns, by how many it has seen: as if it took the mean of them, later of the last 64 or so.
+const SLOWNESS: [u8; SEEN as usize + 1] = {
+    let mut rates = [0; SEEN as usize + 1];
+    let mut n = 0;
+    while n < rates.len() {
+        rates[n] = (n as u32 + 2).ilog2() as u8;
+        n += 1;
+    }
+    rates
+};
+
 impl Bit {
-    /// Never 0 nor 1: the estimates stay below 1 by what a shift rounds off.
-    #[inline]
+    /// Never 0 nor 1, as estimates stay between the [`ENDS`].
+    #[inline(always)]
     pub(super) fn zero(self) -> u32 {
-        ((self.fast as u32 + self.slow as u32) >> 1).clamp(32, (1 << PRECISION) - 32)
+        self.zero as u32
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn learn(&mut self, bit: bool) {
-        if bit {
-            self.fast -= self.fast >> 4;
-            self.slow -= self.slow >> 7;
-        } else {
-            self.fast += ((1 << PRECISION) - self.fast) >> 4;
-            self.slow += ((1 << PRECISION) - self.slow) >> 7;
-        }
+        let rate = SLOWNESS[self.seen.min(SEEN) as usize];
+        self.seen += (self.seen < SEEN) as u16;
+        let zero = self.zero as i32;
+        self.zero = (zero + ((ENDS[bit as usize] - zero) >> rate)) as u16;
     }
 }
 
@@ -50,25 +64,25 @@ impl Default for Number {
     }
 }
 
-/// An adaptive symbol of 16: where the share of each begins, of [`TOTAL`].
+/// An adaptive symbol of 16: where the share of each begins, of [`TOTAL`], and where the last ends, which as a number of 16 bits with a sign is below zero.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nibble {
-    start: [i16; 16],
+    start: [i16; 17],
     seen: u8,
 }
 
 impl Default for Nibble {
     fn default() -> Self {
-        Nibble { start: std::array::from_fn(|i| (i as i16) << (PRECISION - 4)), seen: 0 }
+        Nibble { start: std::array::from_fn(|i| ((i as u32) << (PRECISION - 4)) as u16 as i16), seen: 0 }
     }
 }
 
 impl Nibble {
     /// Start and size of the share of `symbol`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn share(&self, symbol: usize) -> (u32, u32) {
-        let start = self.start[symbol & 15] as u32;
-        let end = if symbol >= 15 { TOTAL } else { self.start[symbol + 1] as u32 };
+        let symbol = symbol & 15;
+        let (start, end) = (self.start[symbol] as u32, self.start[symbol + 1] as u16 as u32);
         (start, end - start)
     }
 
@@ -78,7 +92,7 @@ impl Nibble {
         let slot = slot as i16;
         // All at once, as vectors do it.
         let mut below = 0i16;
-        for s in &self.start {
+        for s in &self.start[..16] {
             below += (*s <= slot) as i16;
         }
         (below as usize).wrapping_sub(1) & 15
@@ -87,8 +101,8 @@ impl Nibble {
     /// Every start moves towards where it were if only `symbol` came and all others kept a share of 1; fast at first.
     #[inline(always)]
     pub(super) fn learn(&mut self, symbol: usize) {
-        let rate = RATES[(self.seen >> 3) as usize & 15];
-        self.seen += (self.seen < 8 * RATES.len() as u8 - 1) as u8;
+        let rate = RATES[(self.seen >> 2) as usize & 31];
+        self.seen += (self.seen < 4 * RATES.len() as u8 - 1) as u8;
         let goals = &GOALS[symbol & 15];
         for (s, goal) in self.start.iter_mut().zip(goals) {
             *s += (goal - *s) >> rate;
@@ -108,5 +122,13 @@ const GOALS: [[i16; 16]; 16] = {
     goals
 };
 
-/// How slowly a [`Nibble`] learns, by how many eights of symbols it has seen.
-const RATES: [u8; 16] = [3, 4, 4, 5, 5, 5, 5, 6, 6, 6, 6, 6, 6, 6, 6, 7];
+/// How slowly a [`Nibble`] learns, by how many fours of symbols it has seen.
+const RATES: [u8; 32] = {
+    let mut rates = [0; 32];
+    let mut n = 0;
+    while n < 32 {
+        rates[n] = (n as u32 + 1).ilog2() as u8 + 2;
+        n += 1;
+    }
+    rates
+};

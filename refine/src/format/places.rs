@@ -29,7 +29,7 @@ impl Lattice {
     /// The index nearest to `x`, 0 where there is none.
     #[inline]
     pub(super) fn nearest(&self, axis: usize, x: f64) -> i64 {
-        let k = ((x - self.origin[axis]) * self.parts / self.step).round_ties_even();
+        let k = round_even((x - self.origin[axis]) * self.parts / self.step);
         if k.abs() < FARTHEST { k as i64 } else { 0 }
     }
 
@@ -51,6 +51,14 @@ impl Lattice {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         positive(self.step) && positive(self.parts) && self.origin.iter().all(|x| x.is_finite())
     }
+}
+
+/// [`f64::round_ties_even`], which is a call where the instruction is not sure to be there.
+#[inline(always)]
+pub(super) fn round_even(x: f64) -> f64 {
+    // Numbers from 2^52 on have no fraction: the sum rounds it off.
+    const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
+    if x.abs() < (1u64 << 51) as f64 { (x + ROUND) - ROUND } else { x.round_ties_even() }
 }
 
 /// The most lattices a mesh may have.
@@ -184,6 +192,14 @@ pub(super) fn push(p: &mut Positions, x: [f64; 3]) {
     }
 }
 
+/// Room for so many more points.
+pub(super) fn reserve(p: &mut Positions, points: usize) {
+    match p {
+        Positions::F32(p) => p.reserve_exact(points),
+        Positions::F64(p) => p.reserve_exact(points),
+    }
+}
+
 /// No points, of the given precision.
 pub(super) fn empty(double: bool) -> Positions {
     if double { Positions::F64(Vec::new()) } else { Positions::F32(Vec::new()) }
@@ -192,4 +208,25 @@ pub(super) fn empty(double: bool) -> Positions {
 /// Bytes the points take.
 pub(super) fn bytes(p: &Positions) -> u64 {
     p.len() as u64 * if p.is_f64() { 24 } else { 12 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn rounding_is_to_even(x in -4e15..4e15f64, k in -3_000_000_000i64..3_000_000_000) {
+            for x in [x, x * 1e-9, x * 1e300, k as f64 + 0.5, k as f64, k as f64 + 0.25] {
+                prop_assert_eq!(round_even(x), x.round_ties_even());
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_rounds_to_none() {
+        assert!(round_even(f64::NAN).is_nan());
+        assert_eq!(round_even(f64::NEG_INFINITY), f64::NEG_INFINITY);
+    }
 }

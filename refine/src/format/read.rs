@@ -103,6 +103,10 @@ pub fn decode_prefix(bytes: &[u8]) -> Result<Decoded, FormatError> {
         }
     }
     let pieces = super::each(others, |c| (c, read_piece(c, assembly.head(c.mesh), slice(c))));
+    assembly.reserve(pieces.iter().filter_map(|(c, piece)| match piece {
+        Ok(Piece::Splits(block)) => Some((c.mesh, &**block)),
+        _ => None,
+    }));
     for (chunk, piece) in pieces {
         match piece.and_then(|p| assembly.add(chunk, p)) {
             Ok(()) => sizes.add(chunk, slice(chunk)),

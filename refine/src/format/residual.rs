@@ -1,7 +1,8 @@
-//! Positions whose surroundings are known: residuals coded by how far the surroundings reach.
+//! Positions whose surroundings are known: residuals in the frame of the surface there.
 //!
-//! As [`super::places`], but the size of a residual is not learned for a whole chunk: it is coded against the extent of the ring along its axis, in
-//! units of the last place.
+//! As [`super::places`], but the size of a residual is not learned for a whole chunk. Across the surface it is coded against how far the ring reaches; the coordinate along which the
+//! surface rises most steeply comes last and is expected on the plane of the ring through the others, so that what is left of it is the distance from that plane: which the error of the
+//! split has told already, roughly.
 
 use super::coder::{Bit, Coder, Nibble, Number, low_mask, unzigzag, zigzag};
 use super::places::{Lattice, order32, order64, unorder32, unorder64};
@@ -12,123 +13,267 @@ pub(super) struct Guess {
     pub(super) at: [f64; 3],
     /// How far its surroundings reach along each axis.
     pub(super) reach: [f64; 3],
+    /// Their plane, through any place p: the sum of slope (x - p) over the axes is 0; 1 for the last of `axes`, and no more for the others.
+    pub(super) slope: [f64; 3],
+    /// How far they reach from the plane through `at`, along the last axis.
+    pub(super) rise: f64,
+    /// The order in which coordinates are coded.
+    pub(super) axes: [usize; 3],
+}
+
+/// Orders of axes, by the last.
+const ORDERS: [[usize; 3]; 3] = [[1, 2, 0], [0, 2, 1], [0, 1, 2]];
+
+impl Guess {
+    /// Sets the plane by its normal.
+    #[inline(always)]
+    pub(super) fn lay(&mut self, normal: [f64; 3]) {
+        let [x, y, z] = normal.map(f64::abs);
+        let last = if x > y && x > z {
+            0
+        } else if y > z {
+            1
+        } else {
+            2
+        };
+        self.axes = ORDERS[last];
+        let n = normal[last];
+        self.slope = [normal[0] / n, normal[1] / n, normal[2] / n];
+        let flat = self.slope.iter().all(|s| s.abs() <= 1.0);
+        if !flat {
+            // No plane: all in one place, or too far away.
+            self.axes = ORDERS[2];
+            self.slope = [0.0, 0.0, 1.0];
+        }
+    }
+
+    /// How far off the plane something that is `d` from a place on it lies, along the last axis.
+    #[inline(always)]
+    pub(super) fn off(&self, d: [f64; 3]) -> f64 {
+        self.slope[0] * d[0] + self.slope[1] * d[1] + self.slope[2] * d[2]
+    }
 }
 
 /// The length that a residual is expected to have is in the middle of the symbols.
 const MIDDLE: i32 = 9;
 /// Lengths beyond are written as numbers.
 const FAR: u32 = 15;
-/// How much flatter than long: classes.
-const FLAT: usize = 4;
+/// Classes of how much flatter than long the surroundings are; of how steep they are against the error.
+const FLAT: usize = 3;
+const STEEP: usize = 8;
+/// All contexts of lengths.
+const CONTEXTS: usize = 2 * FLAT + STEEP;
 
 /// Codes positions of one chunk; `KINDS` kinds of them.
 #[derive(Clone, Debug)]
 pub(super) struct Residuals<const KINDS: usize> {
     double: bool,
-    lattices: Vec<Lattice>,
+    lattices: Vec<(Lattice, i32)>,
     on_lattice: [Bit; KINDS],
     second: [Bit; KINDS],
-    /// By kind, lattice or none, half of the octave, flatness.
-    length: Vec<[[Nibble; FLAT]; 2]>,
+    /// By kind, lattice or none, context, half of the octave.
+    length: Vec<[[Nibble; 2]; CONTEXTS]>,
     top: [Bit; 16],
     far: Number,
 }
 
 /// Half octaves of a positive number, rounded down.
-#[inline]
-fn halves(x: f64) -> i32 {
+#[inline(always)]
+pub(super) fn halves(x: f64) -> i32 {
     (x.to_bits() >> 51) as i32 - (1023 << 1)
+}
+
+/// Coordinates as integers, such that those that can occur are near each other.
+trait Scale {
+    /// The integer of a coordinate, and half octaves of what a step makes there.
+    fn number(&self, axis: usize, x: f64) -> (i64, i32);
+    /// The coordinate.
+    fn at(&self, axis: usize, k: i64) -> f64;
+    /// A difference.
+    fn wrap(&self, x: i64) -> i64;
+}
+
+struct Grid<'a> {
+    lattice: &'a Lattice,
+    unit: i32,
+    double: bool,
+}
+
+impl Scale for Grid<'_> {
+    #[inline(always)]
+    fn number(&self, axis: usize, x: f64) -> (i64, i32) {
+        (self.lattice.nearest(axis, x), self.unit)
+    }
+
+    #[inline(always)]
+    fn at(&self, axis: usize, k: i64) -> f64 {
+        let x = self.lattice.at(axis, k);
+        if self.double { x } else { x as f32 as f64 }
+    }
+
+    #[inline(always)]
+    fn wrap(&self, x: i64) -> i64 {
+        x
+    }
+}
+
+struct Single;
+
+impl Scale for Single {
+    #[inline(always)]
+    fn number(&self, _: usize, x: f64) -> (i64, i32) {
+        let bits = (x as f32).to_bits();
+        (order32(bits) as i64, 2 * ((bits >> 23) as i32 & 0xFF) - 300)
+    }
+
+    #[inline(always)]
+    fn at(&self, _: usize, k: i64) -> f64 {
+        f32::from_bits(unorder32(k as u32)) as f64
+    }
+
+    #[inline(always)]
+    fn wrap(&self, x: i64) -> i64 {
+        x as i32 as i64
+    }
+}
+
+struct Double;
+
+impl Scale for Double {
+    #[inline(always)]
+    fn number(&self, _: usize, x: f64) -> (i64, i32) {
+        let bits = x.to_bits();
+        (order64(bits) as i64, 2 * ((bits >> 52) as i32 & 0x7FF) - 2150)
+    }
+
+    #[inline(always)]
+    fn at(&self, _: usize, k: i64) -> f64 {
+        f64::from_bits(unorder64(k as u64))
+    }
+
+    #[inline(always)]
+    fn wrap(&self, x: i64) -> i64 {
+        x
+    }
 }
 
 impl<const KINDS: usize> Residuals<KINDS> {
     pub(super) fn new(double: bool, lattices: &[Lattice]) -> Self {
+        let nibbles = [[Nibble::default(); 2]; CONTEXTS];
         Residuals {
             double,
-            lattices: lattices.to_vec(),
+            lattices: lattices.iter().map(|l| (*l, halves(l.step / l.parts) & !1)).collect(),
             on_lattice: [Bit::default(); KINDS],
             second: [Bit::default(); KINDS],
-            length: vec![Default::default(); KINDS * (1 + lattices.len())],
+            length: vec![nibbles; KINDS * (1 + lattices.len())],
             top: Default::default(),
             far: Number::default(),
         }
     }
 
-    /// Codes `value`, a place of kind `kind`, given where it is expected.
+    /// Codes `value`, a place of kind `kind` of a split with an error of level `level`, given where it is expected.
     #[inline]
     pub(super) fn code<C: Coder>(
         &mut self,
         c: &mut C,
         kind: usize,
-        guess: &Guess,
+        (guess, level): (&Guess, u16),
         value: [f64; 3],
     ) -> [f64; 3] {
-        let longest = guess.reach[0].max(guess.reach[1]).max(guess.reach[2]);
-        let longest = halves(longest);
-        // Half octaves of reach, and flatness.
-        let near = guess.reach.map(|r| {
-            let h = halves(r).max(longest - 2 * FLAT as i32 + 1);
-            (h, ((longest - h) >> 1) as usize)
-        });
+        let set = kind * (1 + self.lattices.len());
         if !self.lattices.is_empty() {
-            let lattices = &self.lattices;
+            let (double, lattices) = (self.double, &self.lattices);
             let found = if C::READS {
                 None
             } else {
-                lattices.iter().enumerate().find_map(|(i, l)| l.indices(self.double, value).map(|k| (i, k)))
+                lattices.iter().position(|(l, _)| l.indices(double, value).is_some())
             };
             if c.bit(&mut self.on_lattice[kind], found.is_some()) {
-                let (mut which, k) = found.unwrap_or_default();
-                if lattices.len() > 1 {
+                let mut which = found.unwrap_or_default();
+                if self.lattices.len() > 1 {
                     which = c.bit(&mut self.second[kind], which == 1) as usize;
                 }
-                let l = self.lattices[which];
-                let sets = 1 + self.lattices.len();
-                let unit = halves(l.step / l.parts) & !1;
-                let mut out = [0.0; 3];
-                for axis in 0..3 {
-                    let expected = l.nearest(axis, guess.at[axis]);
-                    let residual = k[axis].wrapping_sub(expected);
-                    let (h, flat) = near[axis];
-                    let k = self.residual(c, kind * sets + 1 + which, h - unit, flat, residual);
-                    let x = l.at(axis, expected.wrapping_add(k));
-                    out[axis] = if self.double { x } else { x as f32 as f64 };
-                }
-                return out;
+                let (lattice, unit) = self.lattices[which];
+                let grid = Grid { lattice: &lattice, unit, double: self.double };
+                return self.three(c, &grid, set + 1 + which, (guess, level), value);
             }
         }
-        let set = kind * (1 + self.lattices.len());
-        let mut out = [0.0; 3];
-        for axis in 0..3 {
-            let (h, flat) = near[axis];
-            out[axis] = if self.double {
-                let bits = guess.at[axis].to_bits();
-                let unit = 2 * (((bits >> 52) as i32 & 0x7FF) - 1075);
-                let guess = order64(bits);
-                let residual = order64(value[axis].to_bits()).wrapping_sub(guess) as i64;
-                let r = self.residual(c, set, h - unit, flat, residual);
-                f64::from_bits(unorder64(guess.wrapping_add(r as u64)))
-            } else {
-                let bits = (guess.at[axis] as f32).to_bits();
-                let unit = 2 * (((bits >> 23) as i32 & 0xFF) - 150);
-                let guess = order32(bits);
-                let residual = order32((value[axis] as f32).to_bits()).wrapping_sub(guess) as i32;
-                let r = self.residual(c, set, h - unit, flat, residual as i64);
-                f32::from_bits(unorder32(guess.wrapping_add(r as u32))) as f64
-            };
+        if self.double {
+            self.three(c, &Double, set, (guess, level), value)
+        } else {
+            self.three(c, &Single, set, (guess, level), value)
         }
+    }
+
+    /// The three coordinates.
+    #[inline(always)]
+    fn three<C: Coder, S: Scale>(
+        &mut self,
+        c: &mut C,
+        scale: &S,
+        set: usize,
+        (guess, level): (&Guess, u16),
+        value: [f64; 3],
+    ) -> [f64; 3] {
+        let [a, b, last] = guess.axes;
+        let longest = halves(guess.reach[0].max(guess.reach[1]).max(guess.reach[2]));
+        // Half octaves of reach, and flatness.
+        let near = |axis: usize| {
+            let h = halves(guess.reach[axis]).max(longest - 7);
+            (h, (((longest - h) >> 1) as usize).min(FLAT - 1))
+        };
+        let mut out = [0.0; 3];
+        let (h, flat) = near(a);
+        out[a] = self.one(c, scale, (set, flat), (a, guess.at[a], h), value[a]);
+        let (h, flat) = near(b);
+        out[b] = self.one(c, scale, (set, FLAT + flat), (b, guess.at[b], h), value[b]);
+        // On the plane through both.
+        let expected = guess.at[last]
+            - guess.slope[a] * (out[a] - guess.at[a])
+            - guess.slope[b] * (out[b] - guess.at[b]);
+        let rise = halves(guess.rise).clamp(longest - 24, longest + 2);
+        let steep = guess.slope[a] * guess.slope[a] + guess.slope[b] * guess.slope[b] >= 1.0;
+        let error = if level > 0 { level as i32 - 254 + steep as i32 } else { rise - 4 };
+        let error = error.clamp(longest - 24, longest + 2);
+        let context = 2 * FLAT + (((rise - error).clamp(-4, 11) + 4) >> 1) as usize;
+        out[last] = self.one(c, scale, (set, context), (last, expected, error), value[last]);
         out
     }
 
+    /// One coordinate.
+    #[inline(always)]
+    fn one<C: Coder, S: Scale>(
+        &mut self,
+        c: &mut C,
+        scale: &S,
+        context: (usize, usize),
+        (axis, expected, reach): (usize, f64, i32),
+        value: f64,
+    ) -> f64 {
+        let expected = if expected.abs() < f64::INFINITY { expected } else { 0.0 };
+        let (guess, unit) = scale.number(axis, expected);
+        let want = if C::READS { 0 } else { scale.number(axis, value).0 };
+        let residual = scale.wrap(want.wrapping_sub(guess));
+        let residual = self.residual(c, context, reach - unit, residual);
+        scale.at(axis, guess.wrapping_add(residual))
+    }
+
     /// A residual that is expected to be about 2^(reach / 2) long.
-    #[inline]
-    fn residual<C: Coder>(&mut self, c: &mut C, set: usize, reach: i32, flat: usize, x: i64) -> i64 {
+    #[inline(always)]
+    fn residual<C: Coder>(
+        &mut self,
+        c: &mut C,
+        (set, context): (usize, usize),
+        reach: i32,
+        x: i64,
+    ) -> i64 {
+        let reach = reach.clamp(-3, 128);
         let x = zigzag(x);
         let length = 64 - x.leading_zeros();
-        let shift = (reach >> 1).clamp(MIDDLE - 14, 64) - MIDDLE;
-        let model = &mut self.length[set][(reach & 1) as usize][flat & 3];
+        let shift = (reach >> 1) - MIDDLE;
+        let model = &mut self.length[set][context][(reach & 1) as usize];
         let near = length as i32 - shift;
-        let symbol = if (0..FAR as i32).contains(&near) { near as u32 } else { FAR };
-        let symbol = c.nibble(model, symbol);
+        let symbol = c.nibble(model, if (0..FAR as i32).contains(&near) { near as u32 } else { FAR });
         if symbol == FAR {
             return c.signed(&mut self.far, unzigzag(x));
         }
@@ -137,8 +282,109 @@ impl<const KINDS: usize> Residuals<KINDS> {
             return unzigzag((length == 1) as u64);
         }
         let rest = (length as u32).min(64) - 2;
-        let top = c.bit(&mut self.top[symbol as usize], x >> rest & 1 == 1) as u64;
+        let top = c.bit(&mut self.top[symbol as usize & 15], x >> rest & 1 == 1) as u64;
         let low = c.plain64(rest, x & low_mask(rest));
         unzigzag((2 | top) << rest | low)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::coder::{Decoder, Encoder};
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Coordinates of all sizes, and what is no number.
+    fn coordinate() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            8 => -2.0..2.0f64,
+            1 => any::<f32>().prop_map(f64::from),
+            1 => (-40..40i32).prop_map(|e| (e as f64).exp2()),
+            1 => prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(f64::NEG_INFINITY)],
+        ]
+    }
+
+    fn point() -> impl Strategy<Value = [f64; 3]> {
+        [coordinate(), coordinate(), coordinate()]
+    }
+
+    fn guess() -> impl Strategy<Value = Guess> {
+        (point(), point(), point(), coordinate()).prop_map(|(at, reach, normal, rise)| {
+            let mut g = Guess { at, reach: reach.map(f64::abs), rise: rise.abs(), ..Guess::default() };
+            g.lay(normal);
+            g
+        })
+    }
+
+    fn run<C: Coder>(c: &mut C, r: &mut Residuals<3>, items: &[(usize, Guess, u16, [f64; 3])]) -> Vec<[u64; 3]> {
+        items.iter().map(|(kind, g, level, p)| r.code(c, *kind, (g, *level), *p).map(f64::to_bits)).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn places_return_whatever_was_expected(
+            items in prop::collection::vec((0..3usize, guess(), 0..0x200u16, point()), 0..40),
+            double in any::<bool>(),
+            lattices in 0..3usize,
+            on in prop::collection::vec(any::<bool>(), 40),
+        ) {
+            let all = [
+                Lattice { origin: [0.1, -3.0, 0.0], step: 0.001, parts: 1.0 },
+                Lattice { origin: [0.0; 3], step: 1.0, parts: 1000.0 },
+            ];
+            let items: Vec<_> = items
+                .into_iter()
+                .zip(&on)
+                .map(|((kind, g, level, p), on)| {
+                    let l = &all[kind % 2];
+                    let p = if *on { std::array::from_fn(|a| l.at(a, l.nearest(a, p[a]))) } else { p };
+                    (kind, g, level, if double { p } else { p.map(|x| x as f32 as f64) })
+                })
+                .collect();
+            let new = || Residuals::<3>::new(double, &all[..lattices]);
+            let mut e = Encoder::default();
+            let written = run(&mut e, &mut new(), &items);
+            let want: Vec<_> = items.iter().map(|i| i.3.map(f64::to_bits)).collect();
+            prop_assert_eq!(&written, &want);
+            let mut bytes = Vec::new();
+            e.finish(&mut bytes);
+            let mut d = Decoder::new(&bytes).unwrap();
+            let blank: Vec<_> = items.iter().map(|i| (i.0, i.1, i.2, [0.0; 3])).collect();
+            prop_assert_eq!(run(&mut d, &mut new(), &blank), want);
+            prop_assert!(!d.spent());
+        }
+
+        #[test]
+        fn a_plane_rises_no_steeper_than_its_last_axis(normal in point()) {
+            let mut g = Guess::default();
+            g.lay(normal);
+            let [a, b, last] = g.axes;
+            prop_assert!(g.slope[a].abs() <= 1.0 && g.slope[b].abs() <= 1.0 && g.slope[last] == 1.0);
+            prop_assert_eq!([a, b, last].iter().sum::<usize>(), 3);
+            // Along the plane nothing is off it.
+            let d = [normal[1] - normal[2], normal[2] - normal[0], normal[0] - normal[1]];
+            let size = d.iter().chain(&normal).fold(0.0f64, |m, x| m.max(x.abs()));
+            prop_assert!(!size.is_finite() || g.slope == [0.0, 0.0, 1.0] || g.off(d).abs() <= 1e-9 * size);
+        }
+    }
+
+    #[test]
+    fn on_a_plane_the_last_coordinate_costs_little() {
+        // Places on x + 2 y + 3 z = 6, which the guesses know, and beside it.
+        let bits = |known: bool| {
+            let (mut e, mut r) = (Encoder::default(), Residuals::<3>::new(false, &[]));
+            for k in 0..400u32 {
+                let (x, y) = ((k * 37 % 101) as f64 / 101.0, (k * 53 % 103) as f64 / 103.0);
+                let p = [x, y, (6.0 - x - 2.0 * y) / 3.0].map(|x| x as f32 as f64);
+                let mut g = Guess { at: [0.5, 0.5, 1.5], reach: [0.5; 3], rise: 0.5, ..Guess::default() };
+                g.lay(if known { [1.0, 2.0, 3.0] } else { [0.0; 3] });
+                g.rise = if known { 1e-7 } else { g.rise };
+                r.code(&mut e, 0, (&g, 0), p);
+            }
+            let mut bytes = Vec::new();
+            e.finish(&mut bytes);
+            8 * bytes.len() / 400
+        };
+        assert!(bits(true) + 15 < bits(false), "{} and {}", bits(true), bits(false));
     }
 }

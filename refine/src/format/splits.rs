@@ -54,15 +54,8 @@ impl SplitBlock {
 
     /// Room for so many splits.
     pub(super) fn reserve(&mut self, splits: usize) {
-        self.splits.vertex.reserve_exact(splits);
-        self.splits.left.reserve_exact(splits);
-        self.splits.right.reserve_exact(splits);
-        self.splits.code.reserve_exact(splits);
-        self.splits.error.reserve_exact(splits);
-        match &mut self.new_positions {
-            Positions::F32(p) => p.reserve_exact(splits),
-            Positions::F64(p) => p.reserve_exact(splits),
-        }
+        self.splits.reserve(splits);
+        places::reserve(&mut self.new_positions, splits);
     }
 
     /// Bytes the arrays take.
@@ -118,10 +111,12 @@ pub(super) struct Counts {
     pub(super) explicit: usize,
 }
 
-/// Errors in the file: the upper 10 bits of an f32 below the sign, rounded up: 2 bits of mantissa.
-pub(super) const ERROR_SHIFT: u32 = 21;
+/// Errors in the file: the upper 9 bits of an f32 below the sign, rounded up: 1 bit of mantissa. They are estimates; another bit is 0.9 bits a split.
+pub(super) const ERROR_SHIFT: u32 = 22;
+/// The largest: infinity.
+pub(super) const MOST_LEVEL: u16 = 0x1FE;
 
-/// `error` as the file keeps it: never less, at most a quarter more.
+/// `error` as the file keeps it: never less, at most half more.
 pub(super) fn rounded_error(error: f32) -> f32 {
     f32::from_bits(error_level(error) << ERROR_SHIFT)
 }

@@ -35,21 +35,17 @@ pub(super) const TOUCHED: u8 = 8;
 /// No error yet.
 pub(super) const NO_LEVEL: u16 = u16::MAX;
 
-/// What is known of a vertex.
+/// What is known of a vertex: half a cache line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Vertex {
     /// Where it is.
     pub(super) place: [f64; 3],
-    /// Its place in the order of descent.
-    pub(super) label: Label,
     /// The half with which its ring begins; [`NONE`] for a vertex without faces.
     at: u32,
-    /// Splits of it to come (writer).
-    pub(super) to_come: u32,
-    /// Faces around it.
-    pub(super) valence: u16,
     /// The level of the last error of a split of it, or of that which made it.
     pub(super) level: u16,
+    /// Faces around it, up to 255.
+    pub(super) valence: u8,
     /// What the sweep over the chunk's vertices did with it last.
     pub(super) visit: u8,
 }
@@ -59,6 +55,8 @@ pub(super) struct Vertex {
 pub(super) struct Walk {
     faces: Vec<Face>,
     pub(super) vertices: Vec<Vertex>,
+    /// The place of each vertex in the order of descent.
+    labels: Vec<Label>,
     /// Faces and vertices of the base.
     base: (usize, usize),
     /// Those that are no longer as in the base, perhaps several times.
@@ -148,16 +146,14 @@ impl Walk {
         }
         let links = link_faces(&corners, n0);
         let labels = plan::labels(&plan::base_order(pm));
-        let lone = |(i, &label): (usize, &Label)| Vertex {
+        let lone = |i: usize| Vertex {
             place: places::point(&pm.base_positions, i),
-            label,
             at: NONE,
-            to_come: 0,
-            valence: 0,
             level: NO_LEVEL,
+            valence: 0,
             visit: 0,
         };
-        let mut vertices: Vec<Vertex> = labels.iter().enumerate().map(lone).collect();
+        let mut vertices: Vec<Vertex> = (0..n0).map(lone).collect();
         for (f, corners) in (0u32..).zip(&corners) {
             for (k, &v) in (0u32..).zip(corners) {
                 let v = &mut vertices[v as usize];
@@ -175,6 +171,7 @@ impl Walk {
             base: (corners.len(), vertices.len()),
             changed: Default::default(),
             vertices,
+            labels,
         })
     }
 
@@ -182,9 +179,21 @@ impl Walk {
     pub(super) fn reset(&mut self, base: &Walk) {
         self.faces.truncate(self.base.0);
         self.vertices.truncate(self.base.1);
+        self.labels.truncate(self.base.1);
         let (faces, vertices) = &mut self.changed;
-        faces.drain(..).for_each(|f| self.faces[f as usize] = base.faces[f as usize]);
-        vertices.drain(..).for_each(|v| self.vertices[v as usize] = base.vertices[v as usize]);
+        for f in faces.drain(..) {
+            self.faces[f as usize] = base.faces[f as usize];
+        }
+        for v in vertices.drain(..) {
+            self.vertices[v as usize] = base.vertices[v as usize];
+            self.labels[v as usize] = base.labels[v as usize];
+        }
+    }
+
+    /// Where vertex `v` is in the order of descent.
+    #[inline]
+    pub(super) fn label(&self, v: u32) -> Label {
+        self.labels[v as usize]
     }
 
     /// Notes that vertex `v` is about to change.
@@ -304,13 +313,15 @@ impl Walk {
             // At the border, by the edge between both.
             at_u = turn(at_u);
         }
-        let valence = (count + 1 + two as usize).min(u16::MAX as usize) as u16;
+        let valence = (count + 1 + two as usize).min(255) as u8;
         self.changes(v);
         let vertex = &mut self.vertices[v as usize];
-        let label = vertex.label.split();
         (vertex.at, vertex.level) = (old, level);
-        vertex.valence = vertex.valence.saturating_add(1 + two as u16).saturating_sub(count as u16);
-        self.vertices.push(Vertex { place, label, at: at_u, to_come: 0, valence, level, visit: 0 });
+        let kept = vertex.valence.saturating_add(1 + two as u8);
+        vertex.valence = kept.saturating_sub(count.min(255) as u8);
+        self.vertices.push(Vertex { place, at: at_u, level, valence, visit: 0 });
+        let label = self.labels[v as usize].split();
+        self.labels.push(label);
         for tip in tips {
             self.changes(tip);
             if let Some(t) = self.vertices.get_mut(tip as usize) {

@@ -138,7 +138,7 @@ fn part(kind: ChunkType, critical: bool, mesh: u32, raw: u64, mut bytes: Vec<u8>
 /// `turns` is the common order of the splits of all meshes, as in [`crate::progressive::BuiltAll::turns`] (empty: mesh after mesh); `scene` is kept as it is. The
 /// bounds that meshes carry ([`ProgressiveMesh::bounds`]) are written, widened by what quantising moves. The
 /// splits come in another order in the file than in `meshes`, and so have other numbers ([`ProgressiveMesh::reordered`]); errors are rounded up by
-/// at most an eighth; all else is kept. The bytes do not depend on the number of threads. O(n log n).
+/// at most half; all else is kept. The bytes do not depend on the number of threads. O(n log n).
 ///
 /// Errors: damaged meshes, bits out of range.
 pub fn encode(
@@ -233,6 +233,9 @@ fn encode_mesh(
     let ordered = source.order.is_some() && !options.any_order;
     let plan = Plan::new(source, if ordered { layout.before_order() } else { layout })?;
     let mut pm = source.reordered(&plan.order).ok()?;
+    if options.any_order {
+        input_order::sort_base(&mut pm);
+    }
     let tips = input_order::tips(&pm);
     input_order::turn(&mut pm, &tips, true);
     if lattices.is_empty() {

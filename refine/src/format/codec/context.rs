@@ -4,8 +4,9 @@
 //! tell: which they are, where they open the mesh, and roughly where their vertices are, so that others can be expected amid them. As a split refers
 //! to the rings of the mesh as it is then, this costs no more than it did the first time, and nothing else has to be named.
 
-use super::super::base::MeshHead;
+use super::super::base::{MeshHead, Singles};
 use super::super::coder::{Coder, Nibble, Number, unzigzag, zigzag};
+use super::super::places::round_even;
 use super::super::residual::Guess;
 use super::super::splits::{CONNECTIVITY, Counts, PLACES, STREAMS};
 use super::super::walk::{NO_LEVEL, Walk};
@@ -20,16 +21,17 @@ pub(super) struct Models {
     sources: Number,
     count: Number,
     gap: [Number; 2],
-    /// By how much flatter than long the surroundings are.
-    place: [Nibble; FLAT],
+    /// By how much flatter than long the surroundings are; of the coordinate along which they rise, by how much less they do.
+    place: [[Nibble; FLAT]; 2],
     far: Number,
 }
 
 /// Classes of how much flatter than long.
-const FLAT: usize = 4;
-/// Places are given in steps of 2^-FINE of the longest reach of the surroundings, rounded to a power of two. One more or less is dearer on bunny and horse: finer
-/// places cost more than they spare.
-const FINE: i32 = 2;
+const FLAT: usize = 6;
+/// Places are given in steps of 2^-ACROSS of the longest reach of the surroundings, rounded to a power of two, and how far they are off the plane of the surroundings in steps of
+/// 2^-ALONG. One more or less of either is dearer on bunny and horse: finer places cost more than they spare.
+const ACROSS: i32 = 2;
+const ALONG: i32 = 4;
 
 /// The mesh before the first split, ready for any number of readers.
 #[derive(Clone, Debug, Default)]
@@ -72,7 +74,6 @@ pub(super) struct Known {
     first: u32,
     first_face: u32,
     ids: Vec<u32>,
-    /// `k << 1 | second` of every face of split `k` of these.
     of_face: Vec<u32>,
 }
 
@@ -106,15 +107,15 @@ impl Known {
 
     /// A cut by the number of its face in the file.
     #[inline]
-    pub(super) fn cut(&self, head: &MeshHead, cut: u32) -> Option<u32> {
+    pub(super) fn cut(&self, cut: u32) -> u32 {
         let face = match (cut >> 2).checked_sub(self.faces) {
             None => cut >> 2,
             Some(k) => match self.of_face.get(k as usize) {
-                Some(&of) => head.first_face(*self.ids.get((of >> 1) as usize)?) + (of & 1),
+                Some(&face) => face,
                 None => self.first_face + (k - self.of_face.len() as u32),
             },
         };
-        Some(face << 2 | cut & 3)
+        face << 2 | cut & 3
     }
 }
 
@@ -127,11 +128,14 @@ pub(in super::super) struct Sources<'a> {
     /// Where vertices are at last.
     places: &'a [[f64; 3]],
     first: u32,
+    first_face: u32,
     /// Splits of the context, ascending; of each split its place there.
     ids: Vec<u32>,
     slot: Vec<u32>,
     /// The first face of each, in the mesh of the chunk.
     faces: Vec<u32>,
+    /// `split << 1 | second` of every face that a split makes.
+    maker: Vec<u32>,
 }
 
 impl<'a> Sources<'a> {
@@ -142,7 +146,15 @@ impl<'a> Sources<'a> {
         places: &'a [[f64; 3]],
     ) -> Self {
         let slot = vec![NONE; on.len()];
-        Sources { head, on, chunks, places, first: 0, ids: Vec::new(), slot, faces: Vec::new() }
+        let mut singles = Singles::new(head);
+        let mut maker = Vec::with_capacity(2 * on.len());
+        for i in 0..on.len() as u32 {
+            maker.push(i << 1);
+            if !singles.is(i) {
+                maker.push(i << 1 | 1);
+            }
+        }
+        Sources { head, on, chunks, places, first: 0, first_face: 0, ids: Vec::new(), slot, faces: Vec::new(), maker }
     }
 
     /// All splits before `range` that those in it depend on.
@@ -150,6 +162,7 @@ impl<'a> Sources<'a> {
         self.ids.drain(..).for_each(|i| self.slot[i as usize] = NONE);
         self.faces.clear();
         self.first = range.start as u32;
+        self.first_face = self.head.first_face(self.first);
         let mut at = 0;
         let before = |d: &u32| *d < range.start as u32;
         let slot = &mut self.slot;
@@ -167,10 +180,11 @@ impl<'a> Sources<'a> {
         }
         self.ids.sort_unstable();
         let mut face = self.head.base_faces;
+        let mut singles = Singles::new(self.head);
         for (&i, k) in self.ids.iter().zip(0..) {
             self.slot[i as usize] = k;
             self.faces.push(face);
-            face += 2 - self.head.is_single(i) as u32;
+            face += 2 - singles.is(i) as u32;
         }
         self.faces.push(face);
     }
@@ -188,12 +202,13 @@ impl<'a> Sources<'a> {
     /// A cut by the number of its face in the mesh of the chunk.
     #[inline]
     pub(in super::super) fn cut(&self, cut: u32) -> u32 {
-        let Some((split, second)) = self.head.maker(cut >> 2).filter(|_| cut != NONE) else { return cut };
+        let made = (cut >> 2).checked_sub(self.head.base_faces).filter(|_| cut != NONE);
+        let Some(&maker) = made.and_then(|k| self.maker.get(k as usize)) else { return cut };
+        let (split, second) = (maker >> 1, maker & 1);
         let face = if split >= self.first {
-            let first = self.head.first_face(self.first);
-            self.faces.last().map_or(0, |&f| (cut >> 2) - first + f)
+            self.faces.last().map_or(0, |&f| (cut >> 2) - self.first_face + f)
         } else {
-            self.faces[self.slot[split as usize] as usize] + second as u32
+            self.faces[self.slot[split as usize] as usize] + second
         };
         face << 2 | cut & 3
     }
@@ -252,15 +267,18 @@ impl Codec<'_> {
                 let id = u32::try_from(gap).ok()?.checked_add(next).filter(|&i| i < known.first)?;
                 next = id + 1;
                 let (v, state) = self.sweep(&mut c[CONNECTIVITY], wanted.map_or(NONE, |w| w.vertex))?;
-                let two = !self.head.is_single(id);
+                let two = !self.singles.is(id);
                 let (code, cuts) = self.cuts(&mut c[CONNECTIVITY], (v, state), two, wanted)?;
                 let guess = self.guess(v, &cuts, false);
                 let place = sources.as_ref().map_or([0.0; 3], |s| s.places[id as usize]);
                 let place = self.roughly(&mut c[PLACES], &guess, place);
                 self.apply(v, &cuts, code, (place, NO_LEVEL));
-                let k = known.ids.len() as u32;
+                let face = self.head.base_faces + 2 * id + !two as u32 - self.singles.so_far();
                 known.ids.push(id);
-                known.of_face.extend((0..1 + two as u32).map(|second| k << 1 | second));
+                known.of_face.push(face);
+                if two {
+                    known.of_face.push(face + 1);
+                }
                 if c.iter().any(Coder::spent) {
                     return None;
                 }
@@ -274,26 +292,39 @@ impl Codec<'_> {
     /// A place, in steps that go with its surroundings.
     fn roughly<C: Coder>(&mut self, c: &mut C, guess: &Guess, place: [f64; 3]) -> [f64; 3] {
         let octave = |x: f64| (x.to_bits() >> 52) as i32 - 1023;
+        let power = |e: i32| f64::from_bits(((e + 1023) as u64) << 52);
         let longest = octave(guess.reach[0].max(guess.reach[1]).max(guess.reach[2]));
-        let exponent = longest - FINE;
-        if !(-900..900).contains(&exponent) {
+        if !(-900..900).contains(&longest) {
             // All in one place, or nowhere.
             return guess.at;
         }
-        let step = f64::from_bits(((exponent + 1023) as u64) << 52);
+        let [a, b, last] = guess.axes;
         let mut out = guess.at;
-        for a in 0..3 {
-            let flat = (longest - octave(guess.reach[a])).clamp(0, FLAT as i32 - 1) as usize;
-            let steps = ((place[a] - guess.at[a]) / step).round_ties_even() as i64;
-            let z = zigzag(steps.clamp(-(1 << 40), 1 << 40));
-            let near = c.nibble(&mut self.m.context.place[flat], z.min(15) as u32) as u64;
-            let z = if near < 15 {
-                near
-            } else {
-                15 + (c.number(&mut self.m.context.far, z.wrapping_sub(15)) & ((1 << 42) - 1))
-            };
-            out[a] += unzigzag(z) as f64 * step;
+        for axis in [a, b] {
+            let flat = longest - octave(guess.reach[axis]);
+            let steps = (place[axis] - guess.at[axis]) * power(ACROSS - longest);
+            out[axis] += self.steps(c, (0, flat), steps) * power(longest - ACROSS);
         }
+        let flat = longest - octave(guess.rise);
+        let off = guess.off([place[0] - guess.at[0], place[1] - guess.at[1], place[2] - guess.at[2]]);
+        let steps = self.steps(c, (1, flat), off * power(ALONG - longest)) * power(longest - ALONG);
+        out[last] -= guess.slope[a] * (out[a] - guess.at[a]);
+        out[last] -= guess.slope[b] * (out[b] - guess.at[b]);
+        out[last] += steps;
         out
+    }
+
+    /// A number of steps.
+    #[inline(always)]
+    fn steps<C: Coder>(&mut self, c: &mut C, (kind, flat): (usize, i32), steps: f64) -> f64 {
+        let z = zigzag(round_even(steps.clamp(-1e12, 1e12)) as i64);
+        let model = &mut self.m.context.place[kind][flat.clamp(0, FLAT as i32 - 1) as usize];
+        let near = c.nibble(model, z.min(15) as u32) as u64;
+        let z = if near < 15 {
+            near
+        } else {
+            15 + (c.number(&mut self.m.context.far, z.wrapping_sub(15)) & ((1 << 42) - 1))
+        };
+        unzigzag(z) as f64
     }
 }

@@ -1,8 +1,8 @@
 //! Where a split opens the ring of its vertex.
 
-use super::super::coder::{Coder, Nibble, Number};
+use super::super::coder::{Bit, Coder};
 use super::super::walk::{Cut, cut, turn};
-use super::{Codec, valence_class};
+use super::Codec;
 use crate::aif::NONE;
 use crate::progressive::SplitCode;
 
@@ -15,6 +15,20 @@ const ARRANGEMENT: u16 = 0x3F;
 const TURNED: u32 = 1 << 16;
 /// Beside the code: the cuts are named, not counted.
 const NAMED: u32 = 1 << 17;
+
+/// Edges of a ring still to come that are told apart, for the left cut and for the right one; faces between both.
+const LEFT: usize = 8;
+const RIGHT: usize = 8;
+const DONE: usize = 4;
+/// Which of an edge, the one before and the one behind are long.
+const SHAPES: usize = 8;
+/// Edges of a ring whose lengths count.
+const SEEN: usize = 60;
+
+/// Whether an edge is the left cut: by what the sweep did with the vertex, edges to come, lengths.
+pub(super) type Left = [[[Bit; SHAPES]; LEFT]; 3];
+/// Whether an edge is the right cut: by faces between, edges to come, lengths.
+pub(super) type Right = [[[Bit; SHAPES]; RIGHT]; DONE];
 
 /// The split that a writer wants, in the numbers of its mesh.
 #[derive(Clone, Copy, Debug)]
@@ -73,7 +87,7 @@ impl Codec<'_> {
             if C::READS && rest & TURNED != 0 {
                 self.walk.ring(turn(start), &mut self.ring)?;
             }
-            self.counted(c, state, two, want)?
+            self.counted(c, (v, state), two, want)?
         };
         let (left, inner) = cuts.left.name();
         if left == NONE {
@@ -105,27 +119,78 @@ impl Codec<'_> {
         Some((first, count))
     }
 
-    /// Cuts by their rank in the ring.
+    /// Cuts by going around the ring, edge by edge. The new vertex is rather where edges are long.
+    #[inline]
     fn counted<C: Coder>(
         &mut self,
         c: &mut C,
-        state: u8,
+        (v, state): (u32, u8),
         two: bool,
         want: Option<(usize, usize)>,
     ) -> Option<Cuts> {
-        let (faces, n) = (self.ring.faces(), self.ring.edges());
-        let class = valence_class(n);
-        let (first, count) = want.unwrap_or_default();
-        let model = &mut self.m.rank[state.min(2) as usize][class];
-        let first = rank(c, model, &mut self.m.far, first).filter(|&k| k < n)?;
-        let count = if two {
-            let model = &mut self.m.count[class];
-            let most = if self.ring.closed { faces - 1 } else { faces - first };
-            rank(c, model, &mut self.m.far, count.wrapping_sub(1))?.checked_add(1).filter(|&k| k <= most)?
-        } else {
-            (!self.ring.closed).then_some(faces - first)?
-        };
-        Some(Cuts { left: self.ring.left(first), right: self.ring.right(first, count), first, count })
+        let ring = &self.ring;
+        let (faces, n) = (ring.faces(), ring.edges());
+        let long = self.long(v);
+        let (left, right) = want.unwrap_or_default();
+        // The edge before, edge `k`, the edge behind.
+        let shape = |k: usize| if k < SEEN { (long >> k & 7) as usize } else { 0 };
+        // With one face the whole fan may stay.
+        let edges = if two { faces } else { n };
+        let models = &mut self.m.left[state.min(2) as usize];
+        let mut first = 0;
+        while first + 1 < edges {
+            let model = &mut models[(edges - first - 2).min(LEFT - 1)][shape(first)];
+            if c.bit(model, first == left) {
+                break;
+            }
+            first += 1;
+        }
+        let mut count = faces - first;
+        if two {
+            let most = if ring.closed { faces.checked_sub(1)? } else { count };
+            count = 1;
+            while count < most {
+                let at = if first + count < n { first + count } else { first + count - n };
+                let models = &mut self.m.right[(count - 1).min(DONE - 1)];
+                let model = &mut models[(most - count - 1).min(RIGHT - 1)][shape(at)];
+                if c.bit(model, count == right) {
+                    break;
+                }
+                count += 1;
+            }
+            if count > most {
+                return None;
+            }
+        } else if ring.closed {
+            return None;
+        }
+        Some(Cuts { left: ring.left(first), right: ring.right(first, count), first, count })
+    }
+
+    /// Which edges of the ring are longer than most: of edge k bit k + 1. Before the first of a closed ring comes the last, behind the last the first.
+    #[inline]
+    fn long(&self, v: u32) -> u64 {
+        let (ring, vertices) = (&self.ring, &self.walk.vertices[..]);
+        let t = vertices[v as usize].place;
+        let edges = ring.edges();
+        let n = edges.min(SEEN);
+        let mut squares = [0.0; SEEN];
+        let mut sum = 0.0;
+        for (k, square) in squares.iter_mut().enumerate().take(n) {
+            let p = vertices[ring.far(k) as usize].place;
+            let d = [p[0] - t[0], p[1] - t[1], p[2] - t[2]];
+            *square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            sum += *square;
+        }
+        let mean = sum / n as f64;
+        let mut long = 0;
+        for (k, square) in squares[..n].iter().enumerate() {
+            long |= ((*square > mean) as u64) << (k + 1);
+        }
+        if ring.closed && edges == n {
+            long |= long >> n & 1 | (long >> 1 & 1) << (n + 1);
+        }
+        long
     }
 
     /// Cuts by the numbers of faces: where the vertex has several fans, or the cuts are not named by the later face.
@@ -157,14 +222,5 @@ impl Codec<'_> {
         );
         let (first, count) = self.find(two, Wanted { vertex: v, left, right, code })?;
         Some(Cuts { left: self.ring.left(first), right: self.ring.right(first, count), first, count })
-    }
-}
-
-/// A rank: below 15 as a symbol.
-#[inline]
-fn rank<C: Coder>(c: &mut C, m: &mut Nibble, far: &mut Number, value: usize) -> Option<usize> {
-    match c.nibble(m, value.min(15) as u32) {
-        15 => usize::try_from(c.number(far, (value as u64).wrapping_sub(15))).ok()?.checked_add(15),
-        near => Some(near as usize),
     }
 }

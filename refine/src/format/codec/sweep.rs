@@ -23,14 +23,11 @@ impl Codec<'_> {
     pub(super) fn begin<C: Coder>(&mut self, c: &mut C, of: &[u32], count: usize) -> Option<()> {
         let first = self.walk.vertices.len() as u32;
         let mut older: Vec<u32> = of.iter().copied().filter(|&v| v < first).collect();
-        for &v in &older {
-            self.walk.changes(v);
-            self.walk.vertices[v as usize].to_come += 1;
-        }
-        self.to_come.clear();
-        self.to_come.resize(of.len(), 0);
-        for v in of.iter().filter(|&&v| v >= first) {
-            *self.to_come.get_mut((v - first) as usize)? += 1;
+        if !C::READS {
+            self.to_come.resize(self.to_come.len().max(first as usize + of.len()), 0);
+            for &v in of {
+                *self.to_come.get_mut(v as usize)? += 1;
+            }
         }
         older.sort_unstable();
         older.dedup();
@@ -42,16 +39,14 @@ impl Codec<'_> {
         self.pass.clear();
         self.list.clear();
         self.moved = true;
-        self.begins = first as usize;
         let mut next = 0u64;
         for k in 0..number as usize {
             let gap = c.number(&mut self.m.root, older.get(k).map_or(0, |&r| r as u64 - next));
             let v = u32::try_from(next.checked_add(gap)?).ok().filter(|&v| v < first)?;
             next = v as u64 + 1;
             self.walk.changes(v);
-            let vertex = &mut self.walk.vertices[v as usize];
-            vertex.visit = ROOT;
-            roots.push((vertex.label.key(), v));
+            self.walk.vertices[v as usize].visit = ROOT;
+            roots.push((self.walk.label(v).key(), v));
             if c.spent() {
                 return None;
             }
@@ -83,17 +78,18 @@ impl Codec<'_> {
             }
             let level = vertex.level.min(self.levels[1]).saturating_sub(self.levels[0]);
             // Of the splits that only prepare no level is known.
-            let level = if self.preparing { 6 } else { (level as usize).div_ceil(2).min(5) };
+            let level = if self.preparing { 6 } else { (level as usize).min(5) };
             let class = valence_class(vertex.valence as usize);
             if c.bit(&mut self.m.split[state.min(4) as usize][class][level], v == wanted) {
                 vertex.visit = SPLIT;
                 self.moved = true;
                 if !C::READS {
-                    vertex.to_come = vertex.to_come.checked_sub(1)?;
+                    let left = self.to_come.get_mut(v as usize)?;
+                    *left = left.checked_sub(1)?;
                 }
                 return Some((v, state));
             }
-            let last = vertex.to_come == 0;
+            let last = !C::READS && self.to_come.get(v as usize) == Some(&0);
             if state >= WAITED || !c.bit(&mut self.m.done[state as usize][level], last) {
                 vertex.visit = if state < WAITED { WAITED } else { (state + 1).min(MOST) };
                 self.list.push(v);
