@@ -1,7 +1,7 @@
 //! The `.pm` file: progressive meshes as a stream of chunks. `FORMAT.md` specifies it.
 //!
 //! A file has a directory, the bases, then the splits, coarse to fine: by bands of error, within a band subtree by subtree. So every beginning that ends
-//! with a chunk is a mesh, and each chunk is one range of bytes. Each can be read alone: it repeats, in a fifth to a third of its bytes, the splits that its own build on. With
+//! with a chunk is a mesh, and each chunk is one range of bytes. Each can be read alone: it repeats, in an eighth to a third of its bytes, the splits that its own build on. With
 //! [`EncodeOptions::sequential`] a chunk refers to the mesh that those before it make instead. [`encode`] writes, [`decode`] reads all, [`PmReader`] reads a stream as it arrives,
 //! [`RangeReader`] fetches chunks in any order.
 //!

@@ -121,7 +121,8 @@ impl fmt::Display for FormatError {
         match self {
             Self::NotAProgressiveMesh => write!(f, "no progressive mesh: the first bytes are others"),
             Self::Version(v) => {
-                write!(f, "version {v} of the format; this program reads version {}", VERSION.0)
+                write!(f, "version {v} of the format; this program reads version {}", VERSION.0)?;
+                if *v < VERSION.0 { write!(f, ": encode the mesh again") } else { Ok(()) }
             }
             Self::Features(bits) => {
                 write!(f, "the file needs features this program does not have (bits {bits:#x})")

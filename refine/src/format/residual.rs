@@ -260,13 +260,7 @@ impl<const KINDS: usize> Residuals<KINDS> {
 
     /// A residual that is expected to be about 2^(reach / 2) long.
     #[inline(always)]
-    fn residual<C: Coder>(
-        &mut self,
-        c: &mut C,
-        (set, context): (usize, usize),
-        reach: i32,
-        x: i64,
-    ) -> i64 {
+    fn residual<C: Coder>(&mut self, c: &mut C, (set, context): (usize, usize), reach: i32, x: i64) -> i64 {
         let reach = reach.clamp(-3, 128);
         let x = zigzag(x);
         let length = 64 - x.leading_zeros();
@@ -316,7 +310,11 @@ mod tests {
         })
     }
 
-    fn run<C: Coder>(c: &mut C, r: &mut Residuals<3>, items: &[(usize, Guess, u16, [f64; 3])]) -> Vec<[u64; 3]> {
+    fn run<C: Coder>(
+        c: &mut C,
+        r: &mut Residuals<3>,
+        items: &[(usize, Guess, u16, [f64; 3])],
+    ) -> Vec<[u64; 3]> {
         items.iter().map(|(kind, g, level, p)| r.code(c, *kind, (g, *level), *p).map(f64::to_bits)).collect()
     }
 

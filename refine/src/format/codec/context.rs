@@ -154,7 +154,18 @@ impl<'a> Sources<'a> {
                 maker.push(i << 1 | 1);
             }
         }
-        Sources { head, on, chunks, places, first: 0, first_face: 0, ids: Vec::new(), slot, faces: Vec::new(), maker }
+        Sources {
+            head,
+            on,
+            chunks,
+            places,
+            first: 0,
+            first_face: 0,
+            ids: Vec::new(),
+            slot,
+            faces: Vec::new(),
+            maker,
+        }
     }
 
     /// All splits before `range` that those in it depend on.
