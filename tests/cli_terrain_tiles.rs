@@ -2,8 +2,10 @@
 //! with the writer, and compared with the heights they were made of.
 
 mod common;
+mod common_terrain;
 
 use common::Place;
+use common_terrain::{Glb, glb, pixel};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -41,42 +43,16 @@ const WEST: f64 = 8.0;
 const NORTH: f64 = 47.0;
 const STEP: f64 = 1.0 / 80.0;
 
-/// Vertices of a GLB and its triangles.
-struct Glb {
-    positions: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    uvs: Option<Vec<[f32; 2]>>,
-    triangles: Vec<[usize; 3]>,
-    image: Option<String>,
-}
-
-fn glb(p: &Place, name: &str) -> Glb {
-    let document = gltf::Gltf::open(p.path(name)).unwrap();
-    let blob = document.blob.clone().unwrap();
-    // A node that moves its mesh would move it off its neighbours.
-    assert!(document.nodes().all(|n| {
-        n.transform().matrix()
-            == gltf::scene::Transform::Decomposed {
-                translation: [0.0; 3],
-                rotation: [0.0, 0.0, 0.0, 1.0],
-                scale: [1.0; 3],
-            }
-            .matrix()
-    }));
-    let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
-    let reader = primitive.reader(|_| Some(&blob));
-    let indices: Vec<usize> = reader.read_indices().unwrap().into_u32().map(|i| i as usize).collect();
-    let image = document.images().next().map(|i| match i.source() {
-        gltf::image::Source::Uri { uri, .. } => uri.to_string(),
-        gltf::image::Source::View { .. } => "embedded".into(),
-    });
-    Glb {
-        positions: reader.read_positions().unwrap().collect(),
-        normals: reader.read_normals().unwrap().collect(),
-        uvs: reader.read_tex_coords(0).map(|t| t.into_f32().collect()),
-        triangles: indices.as_chunks::<3>().0.to_vec(),
-        image,
-    }
+/// A tile: a node that moved its mesh would move it off its neighbours.
+fn unmoved(p: &Place, name: &str) -> Glb {
+    let tile = glb(p, name);
+    let still = gltf::scene::Transform::Decomposed {
+        translation: [0.0; 3],
+        rotation: [0.0, 0.0, 0.0, 1.0],
+        scale: [1.0; 3],
+    };
+    assert!(tile.document.nodes().all(|n| n.transform().matrix() == still.clone().matrix()));
+    tile
 }
 
 /// Everything on the common border of two tiles, bit by bit.
@@ -92,19 +68,11 @@ fn on_border(tile: &Glb, axis: usize, at: f32) -> Vec<Vec<u32>> {
     rows
 }
 
-fn png() -> Vec<u8> {
-    let mut bytes = vec![];
-    let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.write_header().unwrap().write_image_data(&[255]).unwrap();
-    bytes
-}
-
 #[test]
 fn glb_tiles_meet_bit_by_bit_at_every_level() {
     let p = Place::new();
     grid(&p, true);
-    p.write("photo.png", png());
+    p.write("photo.png", pixel());
     let report = p
         .done("terrain tin a.asc out --max-error 4 --tiles 4 --tile-format glb --verify --texture photo.png --json -q")
         .json();
@@ -116,13 +84,13 @@ fn glb_tiles_meet_bit_by_bit_at_every_level() {
     assert_eq!(numbers("tiles"), [1.0, 4.0, 16.0]);
     assert_eq!(numbers("max_error"), [16.0, 8.0, 4.0]);
     assert!(levels.iter().all(|l| l["error"].as_f64() <= l["max_error"].as_f64()));
-    assert_eq!(p.read("out/photo.png"), png());
+    assert_eq!(p.read("out/photo.png"), pixel());
     let list: Value = serde_json::from_slice(&p.read("out/tiles.json")).unwrap();
     assert_eq!(list["tiles"].as_array().unwrap().len(), 21);
 
     for n in [2usize, 4] {
         let z = n.ilog2();
-        let tile = |x: usize, y: usize| glb(&p, &format!("out/{z}/{x}/{y}.glb"));
+        let tile = |x: usize, y: usize| unmoved(&p, &format!("out/{z}/{x}/{y}.glb"));
         let mut shared = 0;
         for a in 0..n {
             for b in 0..n - 1 {
@@ -149,7 +117,7 @@ fn heights_of_glb_tiles_are_those_of_the_grid_within_the_error() {
     for (z, tiles, error) in [(0usize, 1usize, 10.0), (1, 2, 5.0)] {
         let mut seen = vec![false; SIDE * SIDE];
         for (x, y) in (0..tiles).flat_map(|x| (0..tiles).map(move |y| (x, y))) {
-            let tile = glb(&p, &format!("out/{z}/{x}/{y}.glb"));
+            let tile = unmoved(&p, &format!("out/{z}/{x}/{y}.glb"));
             for t in &tile.triangles {
                 let [a, b, c] = t.map(|i| tile.positions[i].map(f64::from));
                 each_sample(
@@ -206,7 +174,7 @@ fn a_tileset_is_a_tree_of_boxes_that_hold_their_tiles() {
         let b: Vec<f64> =
             tile["boundingVolume"]["box"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
         let uri = tile["content"]["uri"].as_str().unwrap();
-        for q in glb(&p, &format!("out/{uri}")).positions {
+        for q in unmoved(&p, &format!("out/{uri}")).positions {
             let [x, y, z] = [q[0], -q[2], q[1]].map(f64::from);
             for (k, c) in [x, y, z].into_iter().enumerate() {
                 assert!((c - b[k]).abs() <= b[3 + 4 * k] + 1e-6, "{uri}");
@@ -425,6 +393,36 @@ fn the_number_of_threads_does_not_show_and_nothing_is_replaced() {
 }
 
 #[test]
+fn breaklines_go_through_tiles() {
+    let p = Place::new();
+    grid(&p, true);
+    // Columns 0 to 80 are 0 to 2,400 m, rows from the last. One along a cut, one through samples of the cuts, one between them and through the lake.
+    p.write(
+        "roads.json",
+        r#"{"type": "MultiLineString", "coordinates": [[[1200, 150], [1200, 900]], [[0, 2250], [2400, 1650]], [[30, 1470], [2370, 1530]]]}"#,
+    );
+    for format in ["3d-tiles", "glb"] {
+        let run = p.done(&format!(
+            "terrain tin a.asc {format} --max-error 6 --tiles 4 --tile-format {format} --breaklines roads.json --verify --json"
+        ));
+        let report = run.json();
+        assert_eq!(
+            (&report["verified"]["good"], &report["tiles"]["border_mismatches"]),
+            (&true.into(), &0.into())
+        );
+        let b = &report["breaklines"];
+        assert_eq!((&b["lines"], &b["steps"]), (&3.into(), &3.into()));
+        // The first two are there whole.
+        assert!(b["bent"].as_u64() >= Some(3) && b["missing"] == 1, "{b}");
+        assert!(run.stderr.contains("borders of tiles"), "{}", run.stderr);
+    }
+    // The second goes over column 40 at row 15, and both tiles have that vertex: in metres from the middle.
+    for name in ["glb/2/1/0.glb", "glb/2/2/0.glb"] {
+        assert!(unmoved(&p, name).positions.iter().any(|q| (q[0], q[2]) == (0.0, -750.0)), "{name}");
+    }
+}
+
+#[test]
 fn what_tiles_cannot_be_is_said() {
     let p = Place::new();
     grid(&p, false);
@@ -436,6 +434,7 @@ fn what_tiles_cannot_be_is_said() {
     fails("--max-error 1 --triangles 9", 2, "--triangles");
     fails("--max-error 1 --method regular", 2, "--method best or greedy");
     fails("--max-error 1 --error surface", 2, "--error samples");
+    fails("--max-error 1 --outline-tolerance 1", 2, "--outline-tolerance");
     fails("--max-error 1 --space grid", 2, "--space grid");
     fails("--max-error 1 --png a.png", 2, "--png");
     fails("--max-error 1 --to glb", 2, "directory");

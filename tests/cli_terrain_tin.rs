@@ -1,8 +1,10 @@
 //! `progmesh terrain tin`, end to end.
 
 mod common;
+mod common_terrain;
 
 use common::Place;
+use common_terrain::{Glb, glb, pixel};
 use serde_json::Value;
 
 /// Heights of a hilly raster of 48 x 40 samples, i16, with a lake of voids (-32768) unless told otherwise.
@@ -88,19 +90,13 @@ fn a_glb_is_in_metres_with_y_up_and_the_normals_of_the_grid() {
     let report = tin(&p, "out.glb --max-error 6 --spacing 30,20 --exaggeration 2");
     assert_eq!(report["space"], "world");
     assert_eq!(report["spacing"], serde_json::json!([30.0, 20.0]));
-    let document = gltf::Gltf::open(p.path("out.glb")).unwrap();
-    let blob = document.blob.clone().unwrap();
-    let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
-    let reader = primitive.reader(|_| Some(&blob));
-    let positions: Vec<[f32; 3]> = reader.read_positions().unwrap().collect();
-    let normals: Vec<[f32; 3]> = reader.read_normals().unwrap().collect();
+    let Glb { positions, normals, triangles, document, .. } = glb(&p, "out.glb");
     assert_eq!(positions.len(), normals.len());
     assert!(normals.iter().all(|n| n[1] > 0.0 && (n.iter().map(|c| c * c).sum::<f32>() - 1.0).abs() < 1e-5));
     let most = positions.iter().fold(f32::MIN, |m, p| m.max(p[0]));
     assert_eq!(most, 23.5 * 30.0);
     // Front faces look up.
-    let corners: Vec<usize> = reader.read_indices().unwrap().into_u32().map(|i| i as usize).collect();
-    for t in corners.chunks_exact(3) {
+    for t in triangles {
         let [a, b, c] = [positions[t[0]], positions[t[1]], positions[t[2]]];
         let up = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2]);
         assert!(up > 0.0);
@@ -151,32 +147,20 @@ fn what_cannot_be_is_said() {
     p.run("terrain tin spike.raw out.ply --max-error 1 --size 2x2 --type f64").failed(3, "--nodata");
 }
 
-/// A white PNG of a pixel.
-fn pixel() -> Vec<u8> {
-    let mut bytes = vec![];
-    let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.write_header().unwrap().write_image_data(&[255]).unwrap();
-    bytes
-}
-
 #[test]
 fn a_texture_is_laid_over_the_whole_grid() {
     let p = place();
     p.write("photo.png", pixel());
     tin(&p, "out.glb --max-error 6 --spacing 30 --texture photo.png");
-    let document = gltf::Gltf::open(p.path("out.glb")).unwrap();
-    let blob = document.blob.clone().unwrap();
-    let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
-    let reader = primitive.reader(|_| Some(&blob));
-    let positions: Vec<[f32; 3]> = reader.read_positions().unwrap().collect();
-    let uvs: Vec<[f32; 2]> = reader.read_tex_coords(0).unwrap().into_f32().collect();
+    let Glb { positions, uvs, document, blob, .. } = glb(&p, "out.glb");
+    let uvs = uvs.unwrap();
     for (p, uv) in positions.iter().zip(&uvs) {
         // Half a pixel from the borders, v down as rows go.
         let (column, row) = (p[0] / 30.0 + 23.5, p[2] / 30.0 + 19.5);
         let [u, v] = [(column + 0.5) / 48.0, (row + 0.5) / 40.0];
         assert!((uv[0] - u).abs() < 1e-5 && (uv[1] - v).abs() < 1e-5, "{p:?}: {uv:?}");
     }
+    let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
     let texture = primitive.material().pbr_metallic_roughness().base_color_texture().unwrap();
     let gltf::image::Source::View { view, mime_type } = texture.texture().source().source() else {
         panic!("the picture is not in the file");
@@ -261,6 +245,156 @@ fn breaklines_are_followed_and_what_cannot_be_is_said() {
     fails("--breaklines none.json", 3, "none.json");
     fails("--breaklines roads.json --method regular", 2, "--method best or greedy");
     fails("--breaklines roads.json --breakline-space world", 2, "--breakline-space grid");
-    fails("--breaklines roads.json --tiles 2", 2, "one network");
+    fails("--breaklines roads.json --tiles 2 --tile-format quantized-mesh", 2, "samples of their own");
     fails("--breakline-space grid", 2, "--breaklines");
+}
+
+#[test]
+fn a_simpler_outline_covers_no_void_and_says_what_it_drops() {
+    let p = place();
+    let exact = tin(&p, "exact.obj --max-error 6");
+    assert_eq!(exact["outline"], Value::Null);
+    let mut kept = vec![];
+    for (tolerance, how) in [("0", ""), ("1", ""), ("3", "--on-samples"), ("3", "--method greedy")] {
+        let run = p.done(&format!(
+            "terrain tin hills.raw out.obj --max-error 6 --outline-tolerance {tolerance} {how} {RAW} --verify --json"
+        ));
+        let report = run.json();
+        let (outline, verified) = (&report["outline"], &report["verified"]);
+        assert_eq!(verified["good"], true, "{report}");
+        assert_eq!((&outline["dropped"], &verified["overlapping"]), (&verified["dropped"], &0.into()));
+        let dropped = outline["dropped"].as_u64().unwrap();
+        assert_eq!(run.stderr.contains("are not covered"), dropped > 0, "{}", run.stderr);
+        assert!(tolerance != "0" || dropped == 0 && outline["kept"] == outline["corners"]);
+        kept.push(outline["kept"].as_u64().unwrap());
+        assert!(
+            report["triangles"].as_u64() <= exact["triangles"].as_u64().map(|n| n + 20) || !how.is_empty()
+        );
+    }
+    // No corner of the lake's convex hull can go.
+    assert!(kept[0] > kept[1] && kept[1] >= kept[2] && kept[2] == kept[3], "{kept:?}");
+    for threads in [1, 2] {
+        p.done(&format!(
+            "terrain tin hills.raw {threads}.ply --max-error 4 --outline-tolerance 2 {RAW} --threads {threads} -q"
+        ));
+    }
+    assert!(p.read("1.ply") == p.read("2.ply"));
+    let fails = |what: &str, text: &str| {
+        p.run(&format!("terrain tin hills.raw o.ply --max-error 9 --outline-tolerance {what} {RAW}"))
+            .failed(2, text);
+    };
+    fails("1 --error surface", "--error samples");
+    fails("1 --method regular", "--method best or greedy");
+    fails("1 --tiles 2", "--tiles");
+    fails("-1", "0 or more");
+    fails("nan", "0 or more");
+}
+
+/// A TIFF of one strip of 16-bit samples that says it has this many along a side.
+fn tiff(side: u32, samples: &[i16]) -> Vec<u8> {
+    let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+    let entries: [(u16, u32); 10] = [
+        (256, side),
+        (257, side),
+        (258, 16),
+        (259, 1),
+        (262, 1),
+        (273, 8 + 2 + 120 + 4),
+        (277, 1),
+        (278, side),
+        (279, 2 * samples.len() as u32),
+        (339, 2),
+    ];
+    bytes.extend((entries.len() as u16).to_le_bytes());
+    for (tag, value) in entries {
+        bytes.extend(tag.to_le_bytes());
+        // One number of 32 bits.
+        bytes.extend([4, 0, 1, 0, 0, 0]);
+        bytes.extend(value.to_le_bytes());
+    }
+    bytes.extend([0; 4]);
+    bytes.extend(samples.iter().flat_map(|h| h.to_le_bytes()));
+    bytes
+}
+
+#[test]
+fn bad_grids_end_in_a_clear_error_or_the_right_network() {
+    let p = Place::new();
+    // Names, and how to read them.
+    let parts = |grid: &str| {
+        let (names, how) = grid.split_at(grid.find(" --").unwrap_or(grid.len()));
+        (names.to_string(), how.to_string())
+    };
+    let fails = |grid: &str, code: i32, text: &str| {
+        let (names, how) = parts(grid);
+        p.run(&format!("terrain tin {names} out.ply --max-error 1 {how}")).failed(code, text);
+        assert!(!p.exists("out.ply"), "{grid}");
+    };
+    let good = |grid: &str, error: f64| {
+        let (names, how) = parts(grid);
+        let run =
+            p.done(&format!("terrain tin {names} good.ply --max-error {error} --verify --json -q {how}"));
+        let report = run.json();
+        assert_eq!(report["verified"]["good"], true, "{grid}: {report}");
+        report["triangles"].as_u64().unwrap()
+    };
+    // Truncated, and 65,535 x 65,535 and 65,536 x 65,536 announced in a small file, in every format that announces.
+    let whole = tiff(5, &[7; 25]);
+    p.write("whole.tif", &whole);
+    assert_eq!(good("whole.tif", 0.0), 2);
+    for cut in [1, 30, whole.len() - 20, whole.len() - 5] {
+        p.write("cut.tif", &whole[..whole.len() - cut]);
+        fails("cut.tif", 3, "cut.tif");
+    }
+    for side in [65_535, 65_536] {
+        p.write("huge.tif", tiff(side, &[7; 25]));
+        fails("huge.tif", 3, "huge.tif");
+        p.write("huge.asc", format!("ncols {side}\nnrows {side}\ncellsize 1\n1 2 3\n"));
+        fails("huge.asc", 3, "after 3 of");
+        p.write("huge.raw", [0; 10]);
+        fails(&format!("huge.raw --size {side}x{side} --type f64"), 3, "the file has 10");
+        let mut png = vec![];
+        let mut encoder = png::Encoder::new(&mut png, side, side);
+        encoder.set_color(png::ColorType::Grayscale);
+        // Its head alone.
+        drop(encoder.write_header().unwrap());
+        p.write("huge.png", &png[..png.len().min(60)]);
+        fails("huge.png", 3, "huge.png");
+    }
+    p.write("huge.hgt", [0; 7]);
+    fails("huge.hgt", 3, "huge.hgt");
+    // Raw samples of another size; nothing valid; too few rows or columns for a triangle.
+    p.write("a.raw", [0u8; 200]);
+    fails("a.raw --size 10x11 --type i16", 3, "are 220 bytes, and the file has 200");
+    fails("a.raw --size 10x9 --type i16", 3, "are 180 bytes, and the file has 200");
+    fails("a.raw --size 10x10 --type i16 --nodata 0", 3, "nothing to triangulate");
+    for size in ["100x1", "1x100"] {
+        fails(&format!("a.raw --size {size} --type i16"), 3, "nothing to triangulate");
+    }
+    // One height, by every method; the least that makes a triangle.
+    for method in ["best", "greedy", "decimation", "regular"] {
+        assert_eq!(good(&format!("a.raw --size 10x10 --type i16 --method {method}"), 0.0), 2, "{method}");
+    }
+    p.write("least.raw", [1u8, 2, 3, 4]);
+    assert_eq!(good("least.raw --size 2x2 --type u8", 0.0), 2);
+    assert_eq!(good("least.raw --size 2x2 --type u8 --nodata 2", 0.0), 1);
+    // Heights of 1e30: right where f32 has what it takes, and too coarse for an error of 1 beside others.
+    let f32s = |heights: &[f32]| heights.iter().flat_map(|h| h.to_le_bytes()).collect::<Vec<u8>>();
+    p.write("high.raw", f32s(&[1e30; 9]));
+    for error in [0.0, 1.0, 1e25] {
+        assert_eq!(good("high.raw --size 3x3 --type f32", error), 2);
+    }
+    p.write("spike.raw", f32s(&[1.0, 2.0, 3.0, 4.0, 1e30, 5.0, 6.0, 7.0, -1e30]));
+    fails("spike.raw --size 3x3 --type f32", 3, "--nodata");
+    // -1e30 is marked, and the triangle beside it is gone.
+    assert!(good("spike.raw --size 3x3 --type f32 --nodata -1e30", 1e26) > 2);
+    p.write("infinite.raw", f32s(&[1.0, f32::INFINITY, 3.0, 4.0]));
+    fails("infinite.raw --size 2x2 --type f32", 3, "infinite");
+    // Grids beside each other with steps of different lengths.
+    let square = |n: i16| (0..n * n).flat_map(i16::to_be_bytes).collect::<Vec<u8>>();
+    p.write("N57E011.hgt", square(3));
+    p.write("N57E012.hgt", square(5));
+    fails("N57E011.hgt N57E012.hgt", 3, "N57E012.hgt has a spacing of 0.25 x 0.25");
+    p.write("N57E012.hgt", square(3));
+    good("N57E011.hgt N57E012.hgt", 0.5);
 }

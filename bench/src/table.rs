@@ -58,7 +58,8 @@ fn terrain(all: &Results) -> String {
     }
     let mut out = String::from(
         "\n## Terrain\n\nTriangles for the same greatest error at the samples, each network checked at every sample by separate code: `true error` is what \
-         that found, `beyond` how many samples it found farther than asked. Shares are of Delatin's triangles. Seconds: the call alone.\n",
+         that found, `beyond` how many samples it found farther than asked. Shares are of Delatin's triangles, and \
+         `x Delatin` is of its seconds, which are those of the call alone.\n",
     );
     let mut seen: Vec<(&str, f64)> = vec![];
     for row in &all.terrain {
@@ -80,6 +81,9 @@ fn terrain(all: &Results) -> String {
             }
             let share =
                 reference.map_or("-".into(), |d| format!("{:.2}", r.triangles as f64 / d.triangles as f64));
+            let times = reference
+                .filter(|d| d.seconds.median > 0.0)
+                .map_or("-".into(), |d| format!("{:.2}", r.seconds.median / d.seconds.median));
             vec![
                 label,
                 thousands(r.triangles),
@@ -88,9 +92,11 @@ fn terrain(all: &Results) -> String {
                 thousands(r.beyond),
                 thousands(r.faults),
                 seconds(r.seconds.median),
+                times,
             ]
         });
-        out += &table(&["tool", "triangles", "share", "true error", "beyond", "faults", "seconds"], cells);
+        let head = ["tool", "triangles", "share", "true error", "beyond", "faults", "seconds", "x Delatin"];
+        out += &table(&head, cells);
     }
     out
 }
@@ -431,6 +437,30 @@ mod tests {
             assert!(width == 0 || bars == width, "{line}");
             width = bars;
         }
+    }
+
+    #[test]
+    fn networks_stand_beside_delatin_in_triangles_and_time() {
+        let row = |tool: &str, triangles, seconds| TerrainRow {
+            grid: "alps".into(),
+            tool: tool.into(),
+            threads: 1,
+            triangles,
+            seconds: crate::lines::Runs::of(vec![seconds]),
+            ..TerrainRow::default()
+        };
+        let mut all = results();
+        all.terrain = vec![row("best", 60, 0.3), row("greedy", 101, 0.08), row("delatin", 100, 0.1)];
+        let text = terrain(&all);
+        for words in [
+            "| progmesh best | 60 | 0.60 | 0 | 0 | 0 | 0.300 | 3.00 |",
+            "| progmesh greedy | 101 | 1.01 |",
+            " 0.80 |",
+        ] {
+            assert!(text.contains(words), "{words}\n{text}");
+        }
+        all.terrain.pop();
+        assert!(terrain(&all).contains("| 0.300 | - |"));
     }
 
     #[test]

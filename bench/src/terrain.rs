@@ -110,20 +110,28 @@ pub(crate) fn run(
             asked => asked.to_vec(),
         };
         for error in errors {
+            let mut entries = vec![];
             for tool in TOOLS {
                 let threads = match tool.how {
                     How::Ours(_, _, true) if cores > 1 => vec![1, cores],
                     _ => vec![1],
                 };
-                for threads in threads {
-                    let row = measure(&subject, error, &tool, threads, wanted.repeat, places, folder)?;
-                    let result = match &row.failed {
-                        Some(why) => why.clone(),
-                        None => format!("{} triangles, {:.3} s", row.triangles, row.seconds.median),
-                    };
-                    eprintln!("{}, {error:.4}, {} ({threads}): {result}", row.grid, tool.name);
-                    done(row)?;
+                entries.extend(threads.into_iter().map(|n| Entry::new(&subject, error, tool, n)));
+            }
+            // In turns, so that a busy moment meets all alike.
+            for _ in 0..wanted.repeat.max(1) {
+                for entry in &mut entries {
+                    entry.turn(&subject.grid, places, folder);
                 }
+            }
+            for entry in entries {
+                let (name, row) = (entry.tool.name, entry.finish(&subject.grid));
+                let result = match &row.failed {
+                    Some(why) => why.clone(),
+                    None => format!("{} triangles, {:.3} s", row.triangles, row.seconds.median),
+                };
+                eprintln!("{}, {error:.4}, {name} ({}): {result}", row.grid, row.threads);
+                done(row)?;
             }
         }
         std::fs::remove_file(&input)?;
@@ -140,63 +148,71 @@ fn bytes(grid: &Grid) -> Vec<u8> {
     out
 }
 
-fn measure(
-    subject: &Subject,
-    error: f64,
-    tool: &Tool,
-    threads: usize,
-    repeat: usize,
-    places: &Places,
-    folder: &Path,
-) -> Result<TerrainRow> {
-    let grid = &subject.grid;
-    let mut row = TerrainRow {
-        grid: subject.name.clone(),
-        columns: grid.columns(),
-        rows: grid.rows(),
-        error,
-        tool: tool.id.into(),
-        threads,
-        ..TerrainRow::default()
-    };
-    let mut seconds = vec![];
-    let mut tin = None;
-    for _ in 0..repeat.max(1) {
-        let made = match tool.how {
+/// A tool on a grid: a row to be.
+struct Entry {
+    tool: Tool,
+    row: TerrainRow,
+    seconds: Vec<f64>,
+    tin: Option<Tin>,
+}
+
+impl Entry {
+    fn new(subject: &Subject, error: f64, tool: Tool, threads: usize) -> Self {
+        let row = TerrainRow {
+            grid: subject.name.clone(),
+            columns: subject.grid.columns(),
+            rows: subject.grid.rows(),
+            error,
+            tool: tool.id.into(),
+            threads,
+            ..TerrainRow::default()
+        };
+        Entry { tool, row, seconds: vec![], tin: None }
+    }
+
+    /// Runs it once, unless it failed before.
+    fn turn(&mut self, grid: &Grid, places: &Places, folder: &Path) {
+        if self.row.failed.is_some() {
+            return;
+        }
+        let (error, threads) = (self.row.error, self.row.threads);
+        let made = match self.tool.how {
             How::Ours(method, on_samples, _) => {
-                row.version = env!("CARGO_PKG_VERSION").into();
+                self.row.version = env!("CARGO_PKG_VERSION").into();
                 let options =
                     Options::default().with_max_error(error).with_method(method).with_on_samples(on_samples);
                 ours(grid, &options, threads)
             }
-            How::Python(package) => match version(places, package) {
-                Ok(v) => {
-                    row.version = v;
-                    peer(grid, error, tool, places, folder)
-                }
-                Err(why) => Err(why),
-            },
+            How::Python(package) => version(places, package).and_then(|v| {
+                self.row.version = v;
+                peer(grid, error, &self.tool, places, folder)
+            }),
         };
         match made {
-            Ok((t, s)) => {
-                seconds.push(s);
-                tin = Some(t);
+            Ok((tin, seconds)) => {
+                self.seconds.push(seconds);
+                self.tin = Some(tin);
             }
-            Err(why) => {
-                row.failed = Some(why);
-                return Ok(row);
-            }
+            Err(why) => self.row.failed = Some(why),
         }
     }
-    row.seconds = Runs::of(seconds);
-    if let Some(tin) = tin {
-        let verdict = verify(grid, &tin, error, Contract::Samples);
-        row.triangles = tin.triangles.len();
-        row.max_error = verdict.max_error;
-        row.beyond = verdict.beyond;
-        row.faults = verdict.uncovered + verdict.over_void + verdict.turned + verdict.flat;
+
+    /// The row, with what the separate check finds.
+    fn finish(self, grid: &Grid) -> TerrainRow {
+        let Entry { mut row, seconds, tin, .. } = self;
+        if row.failed.is_some() {
+            return row;
+        }
+        row.seconds = Runs::of(seconds);
+        if let Some(tin) = tin {
+            let verdict = verify(grid, &tin, row.error, Contract::Samples);
+            row.triangles = tin.triangles.len();
+            row.max_error = verdict.max_error;
+            row.beyond = verdict.beyond;
+            row.faults = verdict.uncovered + verdict.over_void + verdict.turned + verdict.flat;
+        }
+        row
     }
-    Ok(row)
 }
 
 /// The inner error is the tool's own failure, in its words.
@@ -278,8 +294,11 @@ mod tests {
         let places = Places { env: folder.path().into(), bench: folder.path().into() };
         let heights = Landscape::new(65, 1).heights();
         let subject = Subject { name: "a".into(), grid: Grid::new(65, 65, heights).unwrap() };
-        for tool in &TOOLS {
-            let row = measure(&subject, 40.0, tool, 1, 1, &places, folder.path()).unwrap();
+        for tool in TOOLS {
+            let mut entry = Entry::new(&subject, 40.0, tool, 1);
+            (0..2).for_each(|_| entry.turn(&subject.grid, &places, folder.path()));
+            assert_eq!(entry.seconds.len(), if matches!(tool.how, How::Ours(..)) { 2 } else { 0 });
+            let row = entry.finish(&subject.grid);
             match tool.how {
                 How::Ours(..) => {
                     assert!(row.failed.is_none() && row.max_error <= 40.0 && row.triangles > 10);

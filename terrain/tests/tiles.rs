@@ -1,7 +1,8 @@
 //! Tiles of small grids: each keeps the error, all together cover the grid, and borders are the same from both sides.
 
 use progmesh_terrain::tin::{
-    Contract, Cuts, Level, Made, Method, Options, Quiet, Tiling, Tin, TinError, triangulate, verify,
+    Contract, Cuts, Level, Made, Method, Options, Quiet, Tiling, Tin, TinError, lines_missing, triangulate,
+    verify,
 };
 use progmesh_terrain::{Grid, Window};
 use proptest::prelude::*;
@@ -108,6 +109,44 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// Whatever lines there are, tiles keep the error and fit; where no line was led aside, sides follow all of them through the tiles.
+    #[test]
+    fn breaklines_go_through_tiles(
+        heights in proptest::collection::vec(-30..30i32, 17 * 17),
+        void in proptest::collection::vec(0..100u32, 17 * 17),
+        share in prop_oneof![Just(0u32), Just(10)],
+        lines in proptest::collection::vec(proptest::array::uniform2(proptest::array::uniform2(0..17u32)), 1..6),
+        across in 1..5usize,
+        error in 1..40u32,
+        greedy in any::<bool>(),
+    ) {
+        let height = |i: usize| if void[i] < share { f64::NAN } else { f64::from(heights[i]) };
+        let grid = Grid::new(17, 17, (0..289).map(height).collect()).unwrap();
+        let method = if greedy { Method::Greedy } else { Method::Best };
+        let options = Options::default().with_method(method).with_breaklines(lines.clone());
+        let Ok(tiling) = Tiling::new(&grid, &options, f64::from(error)) else { return Ok(()) };
+        let level = tiling.level(Cuts::even(17, 17, across), f64::from(error)).unwrap();
+        check(&grid, &level, f64::from(error));
+        let (mut all, mut aside) = (Tin::default(), level.bent());
+        for tile in (0..across).flat_map(|j| (0..across).map(move |i| [i, j])) {
+            let Some(made) = level.tile(tile, &Quiet).unwrap() else { continue };
+            let first = all.points.len() as u32;
+            all.points.extend(made.tin.points);
+            all.triangles.extend(made.tin.triangles.iter().map(|t| t.map(|v| v + first)));
+            aside += made.bent + made.outside;
+        }
+        if share == 0 && aside == 0 {
+            prop_assert_eq!(lines_missing(&all, &lines), 0);
+        }
+        if share == 0 && across == 1 && lines.len() == 1 {
+            prop_assert_eq!(aside, 0);
+        }
+    }
+}
+
 fn hills(n: usize) -> Grid {
     let height = |i: usize| {
         let (x, y) = ((i % n) as f64, (i / n) as f64);
@@ -187,6 +226,7 @@ fn what_cannot_be_is_said() {
     let tiling = |options: Options, error| Tiling::new(&grid, &options, error).map(|_| ()).unwrap_err();
     assert_eq!(tiling(Options::default().with_method(Method::Regular), 1.0), TinError::NoTiles);
     assert_eq!(tiling(Options::default().with_contract(Contract::Surface), 1.0), TinError::NoTiles);
+    assert_eq!(tiling(Options::default().with_outline_tolerance(1.0), 1.0), TinError::NoTiles);
     assert_eq!(tiling(Options::default(), f64::NAN), TinError::BadError);
     let tiling = Tiling::new(&grid, &Options::default(), 1.0).unwrap();
     for columns in [vec![], vec![0], vec![0, 4], vec![1, 8], vec![0, 4, 4, 8], vec![0, 9]] {

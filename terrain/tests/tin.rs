@@ -1,7 +1,9 @@
 //! Networks of small grids, checked by code that shares nothing with what makes them.
 
 use progmesh_terrain::Grid;
-use progmesh_terrain::tin::{Contract, Made, Method, Options, Quiet, TinError, triangulate, verify};
+use progmesh_terrain::tin::{
+    Contract, Made, Method, Options, Quiet, TinError, triangulate, verify, verify_outline,
+};
 use proptest::prelude::*;
 
 const METHODS: [Method; 4] = [Method::Regular, Method::Greedy, Method::Decimation, Method::Best];
@@ -90,6 +92,22 @@ fn the_best_takes_far_fewer_triangles_than_greedy_insertion() {
 }
 
 #[test]
+fn a_grid_of_several_parts_is_one_network() {
+    // 400 x 60 samples are cut in two; a lake lies on the cut.
+    let grid = rough(400, 60);
+    let void = |i: usize| ((i % 400) as f64 - 200.0).hypot((i / 400) as f64 - 30.0) < 12.0;
+    let heights = grid.heights().iter().enumerate().map(|(i, &h)| if void(i) { f64::NAN } else { h });
+    let lake = Grid::new(400, 60, heights.collect()).unwrap();
+    for grid in [grid, lake] {
+        let options = Options::default().with_max_error(6.0);
+        let best = make(&grid, &options).tin;
+        let greedy = make(&grid, &options.with_method(Method::Greedy)).tin;
+        let counts = [best, greedy].map(|tin| tin.triangles.len());
+        assert!(counts[0] * 100 <= counts[1] * 70, "{counts:?}");
+    }
+}
+
+#[test]
 fn the_surface_is_kept_between_samples() {
     let grid = rough(90, 70);
     for method in METHODS {
@@ -142,6 +160,81 @@ fn an_outline_loses_no_point_and_gains_none() {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// A simpler outline: near the exact one, no void sample covered, every sample that is covered within the error, what is not counted.
+    #[test]
+    fn a_simpler_outline_keeps_what_it_covers(
+        heights in proptest::collection::vec(-30..30i32, 400),
+        void in proptest::collection::vec(0..100u32, 400),
+        share in prop_oneof![Just(2u32), Just(10), Just(35)],
+        lake in (0..20i32, 0..20i32, 0..9i32),
+        tolerance in prop_oneof![Just(0.0), Just(0.8), Just(2.0), Just(50.0)],
+        error in 0..40u32,
+        on_samples in any::<bool>(),
+        greedy in any::<bool>(),
+    ) {
+        let is_void = |i: usize| {
+            let (x, y) = (i as i32 % 20, i as i32 / 20);
+            void[i] < share || (x - lake.0).pow(2) + (y - lake.1).pow(2) < lake.2.pow(2)
+        };
+        let height = |i: usize| if is_void(i) { f64::NAN } else { f64::from(heights[i]) };
+        let grid = Grid::new(20, 20, (0..400).map(height).collect()).unwrap();
+        let options = Options::default()
+            .with_max_error(f64::from(error))
+            .with_method(if greedy { Method::Greedy } else { Method::Best })
+            .with_on_samples(on_samples)
+            .with_outline_tolerance(tolerance);
+        let made = match triangulate(&grid, &options, &Quiet) {
+            Ok(made) => made,
+            Err(e) => {
+                prop_assert_eq!(e, TinError::Nothing);
+                return Ok(());
+            }
+        };
+        let verdict = verify_outline(&grid, &made.tin, f64::from(error), tolerance);
+        prop_assert!(verdict.is_good() && verdict.exact, "{:?}", verdict);
+        let outline = made.outline.unwrap_or_default();
+        prop_assert_eq!(outline.dropped, verdict.dropped);
+        prop_assert!(outline.kept <= outline.corners);
+        if tolerance == 0.0 {
+            prop_assert_eq!((outline.dropped, outline.kept), (0, outline.corners));
+            prop_assert!(verify(&grid, &made.tin, f64::from(error), Contract::Samples).is_good());
+        }
+        // By looking at every sample and triangle.
+        let mut covered = vec![false; 400];
+        for t in &made.tin.triangles {
+            let [a, b, c] = t.map(|v| made.tin.points[v as usize].map(i64::from));
+            let side = |p: [i64; 2], q: [i64; 2], r: [i64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+            for (i, covered) in covered.iter_mut().enumerate() {
+                let s = [i as i64 % 20, i as i64 / 20];
+                *covered |= side(a, b, s) >= 0 && side(b, c, s) >= 0 && side(c, a, s) >= 0;
+            }
+        }
+        prop_assert!((0..400).all(|i| !(covered[i] && is_void(i))), "a void sample is covered");
+    }
+}
+
+#[test]
+fn breaklines_and_a_simpler_outline_go_together() {
+    let grid = rough(60, 50);
+    let void = |i: usize| ((i % 60) as f64 - 30.0).hypot((i / 60) as f64 - 25.0) < 9.0;
+    let heights = grid.heights().iter().enumerate().map(|(i, &h)| if void(i) { f64::NAN } else { h });
+    let grid = Grid::new(60, 50, heights.collect()).unwrap();
+    let lines = vec![[[3, 4], [57, 46]], [[2, 40], [58, 9]], [[2, 47], [50, 48]]];
+    for method in [Method::Greedy, Method::Best] {
+        let options = Options::default().with_max_error(4.0).with_method(method);
+        let made =
+            triangulate(&grid, &options.with_breaklines(lines.clone()).with_outline_tolerance(1.5), &Quiet)
+                .unwrap();
+        let verdict = verify_outline(&grid, &made.tin, 4.0, 1.5);
+        assert!(verdict.is_good() && verdict.exact, "{verdict:?}");
+        assert!(made.outside > 0 && made.outline.unwrap().kept < made.outline.unwrap().corners);
+        assert!(follows(&made, lines[2]));
+    }
+}
+
 #[test]
 fn a_count_of_triangles_ends_the_work() {
     let grid = rough(80, 80);
@@ -165,6 +258,18 @@ fn what_cannot_be_is_said() {
     assert_eq!(fails(&Grid::new(0, 0, vec![]).unwrap(), &options), TinError::Nothing);
     assert_eq!(fails(&all(0.0), &Options::default().with_max_error(f64::NAN)), TinError::BadError);
     assert_eq!(fails(&all(0.0), &Options::default().with_max_error(-1.0)), TinError::BadError);
+    let outline = |method, contract, tolerance| {
+        Options::default()
+            .with_max_error(1.0)
+            .with_method(method)
+            .with_contract(contract)
+            .with_outline_tolerance(tolerance)
+    };
+    assert_eq!(fails(&all(0.0), &outline(Method::Regular, Contract::Samples, 1.0)), TinError::NoOutline);
+    assert_eq!(fails(&all(0.0), &outline(Method::Best, Contract::Surface, 1.0)), TinError::NoOutline);
+    for bad in [-1.0, f64::NAN, f64::INFINITY] {
+        assert_eq!(fails(&all(0.0), &outline(Method::Best, Contract::Samples, bad)), TinError::BadOutline);
+    }
     let mut spike = vec![0.1; 9];
     spike[4] = 1e30;
     let spike = Grid::new(3, 3, spike).unwrap();

@@ -16,6 +16,8 @@ struct TerrainTin {
     #[serde(deserialize_with = "present")]
     filled: Option<usize>,
     #[serde(deserialize_with = "present")]
+    outline: Option<TerrainOutline>,
+    #[serde(deserialize_with = "present")]
     breaklines: Option<TerrainBreaklines>,
     grid_triangles: usize,
     method: String,
@@ -49,6 +51,15 @@ struct TerrainError {
     max: f64,
     rms: f64,
     surface: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TerrainOutline {
+    tolerance: f64,
+    corners: usize,
+    kept: usize,
+    dropped: usize,
 }
 
 #[derive(Deserialize)]
@@ -106,6 +117,9 @@ struct TerrainVerified {
     turned: usize,
     flat: usize,
     excess_area: i64,
+    dropped: usize,
+    overlapping: usize,
+    astray: usize,
 }
 
 #[derive(Deserialize)]
@@ -198,6 +212,12 @@ fn terrain_tin() {
         serde_json::from_str(&p.done(&format!("{TERRAIN} --breaklines lines.json")).stdout).unwrap();
     let b = lines.breaklines.unwrap();
     assert_eq!((b.lines, b.steps, b.beyond, b.bent, b.outside, b.missing), (1, 1, 0, 0, 0, Some(0)));
+    let simple = format!("{TERRAIN} --nodata 0 --outline-tolerance 1");
+    let simple: TerrainTin = serde_json::from_str(&p.done(&simple).stdout).unwrap();
+    let (o, v) = (simple.outline.unwrap(), simple.verified.unwrap());
+    assert!(o.tolerance == 1.0 && o.kept <= o.corners && o.dropped == v.dropped && v.good);
+    assert_eq!((v.overlapping, v.astray), (0, 0));
+    assert!(tin.outline.is_none());
     assert!(
         tin.breaklines.is_none() && tin.tiles.is_none() && tin.filled.is_none() && tiles.levels[1].tiles == 4
     );

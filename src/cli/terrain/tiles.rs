@@ -69,6 +69,16 @@ pub(super) struct Outcome {
     pub valid_and_isolated: [usize; 2],
     pub grid_triangles: usize,
     pub verdict: Option<Verdict>,
+    /// What became of the breaklines at the finest level.
+    pub lines: Lines,
+}
+
+/// Pieces of breaklines, as [`tin::Made`] counts them, and lines that no sides follow, if that was checked.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Lines {
+    pub bent: usize,
+    pub outside: usize,
+    pub missing: Option<usize>,
 }
 
 /// A level to make: its number from the coarsest, its cuts, its error.
@@ -91,8 +101,10 @@ struct Done {
     bytes: usize,
     sag: f64,
     verdict: Option<Verdict>,
-    /// For the check of borders.
+    /// For the checks of borders and breaklines.
     tin: Option<Tin>,
+    bent: usize,
+    outside: usize,
     warnings: Vec<String>,
 }
 
@@ -146,8 +158,9 @@ impl Job<'_> {
         };
         let mut levels = vec![];
         let mut all = vec![];
+        let mut lines = Lines::default();
         for plan in &plans {
-            let done = work.level(plan).map_err(|e| match e {
+            let (done, bent) = work.level(plan).map_err(|e| match e {
                 Stop::Tin(e) => failure(self.file, &e),
                 Stop::Io(e) => unwritten(e),
                 Stop::Encode(e) => Failure::Output(format!("{}: {e}", target.display())),
@@ -161,12 +174,16 @@ impl Job<'_> {
             }
             let step = geodetic.as_ref().map(|_| quantized_mesh::height_step(work.heights(plan.error)));
             levels.push(level_report(plan, &done, self.verify.then_some(&borders), step));
+            lines.bent = bent + done.iter().map(|d| d.bent).sum::<usize>();
+            lines.outside = done.iter().map(|d| d.outside).sum();
             all.push(done);
         }
         drop(progress);
         let finest = all.last().map_or(&[][..], Vec::as_slice);
         let verdict = self.verify.then(|| sum(all.iter().flatten().filter_map(|d| d.verdict)));
+        lines.missing = self.verify.then(|| missing(finest, &self.options.breaklines));
         let outcome = Outcome {
+            lines,
             tiles: Tiles {
                 format: self.format.name(),
                 directory: target.display().to_string(),
@@ -353,8 +370,8 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Makes and writes the tiles of a level, in the order of their rows and columns.
-    fn level(&self, plan: &Plan) -> Result<Vec<Done>, Stop> {
+    /// Makes and writes the tiles of a level, in the order of their rows and columns; and how often that led breaklines over samples of borders.
+    fn level(&self, plan: &Plan) -> Result<(Vec<Done>, usize), Stop> {
         let cuts = plan.cuts.clone();
         let level = match self.space {
             Space::Globe(globe) => {
@@ -375,7 +392,7 @@ impl Work<'_> {
             done
         });
         let made: Result<Vec<Option<Done>>, Stop> = made.collect();
-        Ok(made?.into_iter().flatten().collect())
+        Ok((made?.into_iter().flatten().collect(), level.bent()))
     }
 
     fn tile(&self, plan: &Plan, level: &tin::Level<'_>, tile: [usize; 2]) -> Result<Option<Done>, Stop> {
@@ -421,6 +438,8 @@ impl Work<'_> {
             bytes: bytes.len(),
             sag: if on_globe { Globe::sag(longest(&places, &made.tin)) } else { 0.0 },
             verdict,
+            bent: made.bent,
+            outside: made.outside,
             tin: self.job.verify.then_some(made.tin),
             warnings,
         }))
@@ -504,6 +523,18 @@ fn sum(verdicts: impl Iterator<Item = Verdict>) -> Verdict {
         all.exact &= v.exact;
     }
     all
+}
+
+/// Lines that the sides of no tiles follow from end to end.
+fn missing(done: &[Done], lines: &[[[u32; 2]; 2]]) -> usize {
+    let mut all = Tin::default();
+    for tin in done.iter().filter_map(|d| d.tin.as_ref()) {
+        let first = all.points.len() as u32;
+        all.points.extend(&tin.points);
+        all.heights.extend(&tin.heights);
+        all.triangles.extend(tin.triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+    tin::lines_missing(&all, lines)
 }
 
 fn overall(done: &[Done]) -> Errors {

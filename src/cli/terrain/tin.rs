@@ -4,7 +4,7 @@ use super::breaklines::{BreaklineArgs, Breaklines};
 use super::dress::DressArgs;
 use super::input::{GridInput, known_spacing, whole};
 use super::tiles::{self, Job, TileFormat};
-use super::tin_report::{ErrorReport, Report, Seconds, Verified};
+use super::tin_report::{ErrorReport, OutlineReport, Report, Seconds, Verified};
 use crate::cli::Failure;
 use crate::cli::args::{self, Output};
 use crate::cli::common::{self, Warnings, thousands};
@@ -23,8 +23,8 @@ use std::time::Instant;
 /// Make few triangles of a height grid, none of its samples farther from them than an error.
 ///
 /// The error is vertical, in the grid's units, and holds at the samples (--error surface: between them too), exactly, for the coordinates as they are written: every valid sample is looked at, in
-/// integers. Voids stay open: the surface is that of the grid triangles of three valid samples, with the same outline. Vertices lie at
-/// samples; their heights are free within the error, unless --on-samples keeps them.
+/// integers. Voids stay open: the surface is that of the grid triangles of three valid samples, with the same outline (or a simpler one:
+/// --outline-tolerance). Vertices lie at samples; their heights are free within the error, unless --on-samples keeps them.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -34,6 +34,7 @@ Examples:
   progmesh terrain tin alps.tif alps.ply --max-error 5 --method greedy --verify
   progmesh terrain tin alps.tif alps.glb --max-error 5 --texture orthophoto.jpg
   progmesh terrain tin alps.tif alps.ply --max-error 5 --fill --breaklines roads.geojson
+  progmesh terrain tin N57E011.hgt coast.ply --max-error 10 --outline-tolerance 1 --verify
   progmesh terrain tin alps.tif tiles --max-error 5 --tiles 8
   progmesh terrain tin alps.tif terrain --max-error 5 --tiles 8 --tile-format quantized-mesh
   progmesh terrain tin dem.raw dem.stl --size 1025x1025 --type u16 --max-error 3 --on-samples
@@ -79,6 +80,14 @@ pub(crate) struct Args {
     /// Fill voids that do not reach the border of the grid from their rims, as a membrane stretched over them: invented heights
     #[arg(long, help_heading = "Voids")]
     fill: bool,
+
+    /// Simplify the outline of what is valid: by up to T samples (steps of the grid) on either side, without covering a void sample
+    ///
+    /// Valid samples beside the outline may end up outside of it; they are counted (--json: outline.dropped). The error holds for all that are covered. What
+    /// lies on the border of the grid stays. About 1 makes shores straight that voids cut into steps. With --method best or greedy and --error samples.
+    #[arg(long, value_name = "T", value_parser = args::not_negative, allow_negative_numbers = true,
+          conflicts_with = "tiles", help_heading = "Voids")]
+    outline_tolerance: Option<f64>,
 
     #[command(flatten)]
     breaklines: BreaklineArgs,
@@ -220,6 +229,12 @@ impl Args {
                 "--breaklines goes with --method best or greedy and --error samples".into(),
             ));
         }
+        if self.outline_tolerance.is_some() && (!known || self.error == ContractName::Surface) {
+            return Err(Failure::Usage(
+                "--outline-tolerance goes with --method best or greedy and --error samples: along a simpler outline no vertex can mend the error between samples"
+                    .into(),
+            ));
+        }
         let file = self.input.name();
         common::in_pool(self.threads, || {
             let source = self.input.open(warnings)?;
@@ -238,9 +253,15 @@ impl Args {
             drop(progress);
             let make = making.elapsed().as_secs_f64();
             warnings.say(isolated_samples(made.isolated).map(|w| format!("{file}: {w}")));
+            let outline =
+                made.outline.map(|o| OutlineReport::of(&o, self.outline_tolerance.unwrap_or_default()));
+            let dropped = outline.as_ref().and_then(OutlineReport::warning);
+            warnings.say(dropped.map(|w| format!("{file}: {w}")));
             let verifying = Instant::now();
-            let verdict = self.verify.then(|| {
-                tin::verify(&grid, &made.tin, self.max_error.unwrap_or(f64::INFINITY), self.error.contract())
+            let most = self.max_error.unwrap_or(f64::INFINITY);
+            let verdict = self.verify.then(|| match &outline {
+                Some(o) => tin::verify_outline(&grid, &made.tin, most, o.tolerance),
+                None => tin::verify(&grid, &made.tin, most, self.error.contract()),
             });
             if let Some(b) = &mut breaklines {
                 (b.bent, b.outside) = (made.bent, made.outside);
@@ -267,7 +288,7 @@ impl Args {
             let total = start.elapsed().as_secs_f64();
             let seconds = Seconds { read, make, verify, write, draw, total };
             let report = self.report(&file, &grid, space, &made, verdict.as_ref(), seconds);
-            Ok(Report { filled, breaklines, ..report })
+            Ok(Report { filled, breaklines, outline, ..report })
         })
     }
 
@@ -290,12 +311,16 @@ impl Args {
             || self.error == ContractName::Surface
         {
             return Err(Failure::Usage(
-                "--tiles goes with --method best or greedy and --error samples: borders of tiles know their own samples only"
+                "--tiles goes with --method best or greedy and --error samples: a border of tiles knows its own samples only, and what the error is between \
+                 these and those beside it follows from both; --error surface makes one network"
                     .into(),
             ));
         }
-        if self.breaklines.are_given() {
-            return Err(Failure::Usage("--breaklines goes into one network: leave out --tiles".into()));
+        if self.breaklines.are_given() && self.tile_format == TileFormat::QuantizedMesh {
+            return Err(Failure::Usage(
+                "--breaklines lead from sample to sample, and quantized-mesh tiles have samples of their own: --tile-format 3d-tiles and glb follow them"
+                    .into(),
+            ));
         }
         if self.tile_format == TileFormat::QuantizedMesh && (self.spacing.is_some() || self.dress.drapes()) {
             return Err(Failure::Usage(
@@ -327,19 +352,25 @@ impl Args {
             interrupt.be_graceful();
             let making = Instant::now();
             let error = self.max_error.unwrap_or_default();
+            let (lines, mut breaklines) = self.breaklines.steps(&source, warnings)?;
             let job = Job {
                 file: &file,
                 source: &source,
                 space,
                 dress: &dress,
                 facts: facts(&source, &grid, space, error),
-                options: self.options(),
+                options: self.options().with_breaklines(lines),
                 error,
                 format: self.tile_format,
                 verify: self.verify,
             };
             let outcome = job.run(&grid, across, &target, (interrupt, self.quiet), warnings)?;
             let make = making.elapsed().as_secs_f64();
+            if let Some(b) = &mut breaklines {
+                (b.bent, b.outside, b.missing) =
+                    (outcome.lines.bent, outcome.lines.outside, outcome.lines.missing);
+                warnings.say(bent(b).map(|w| format!("{file}: {w}")));
+            }
             let [valid, isolated] = outcome.valid_and_isolated;
             warnings.say(isolated_samples(isolated).map(|w| format!("{file}: {w}")));
             let total = start.elapsed().as_secs_f64();
@@ -350,7 +381,7 @@ impl Args {
             let report = self.report(&file, &grid, space, &made, outcome.verdict.as_ref(), seconds);
 
             let (triangles, vertices) = (outcome.triangles, outcome.vertices);
-            Ok(Report { filled, triangles, vertices, tiles: Some(outcome.tiles), ..report })
+            Ok(Report { filled, breaklines, triangles, vertices, tiles: Some(outcome.tiles), ..report })
         })
     }
 
@@ -373,6 +404,7 @@ impl Args {
             .with_on_samples(self.on_samples)
             .with_contract(self.error.contract());
         (options.max_error, options.triangles) = (self.max_error, self.triangles);
+        options.outline_tolerance = self.outline_tolerance;
         options
     }
 
@@ -436,6 +468,7 @@ impl Args {
             verified: verdict.map(|v| Verified::of(v, self.error.contract())),
             tiles: None,
             filled: None,
+            outline: None,
             breaklines: None,
             space,
             spacing,
@@ -481,7 +514,8 @@ fn picture_space(source: &GridFile, grid: &Grid, space: Space) -> Space {
 fn bent(b: &Breaklines) -> Option<String> {
     (b.bent + b.outside > 0).then(|| {
         format!(
-            "breaklines: {} pieces were led over the nearest sample where lines cross or voids begin, {} left out where nothing is valid",
+            "breaklines: {} pieces were led over the nearest sample where lines cross each other or borders of tiles, or voids begin, {} left out where \
+             nothing is valid",
             thousands(b.bent),
             thousands(b.outside)
         )

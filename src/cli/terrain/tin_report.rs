@@ -3,7 +3,7 @@
 use super::breaklines::Breaklines;
 use super::tile_report::Tiles;
 use crate::cli::common::{short, thousands};
-use progmesh::terrain::tin::{Contract, Verdict};
+use progmesh::terrain::tin::{Contract, Outlined, Verdict};
 use serde::Serialize;
 
 /// The schema of `terrain tin --json`; docs/json.md says what each field means.
@@ -16,6 +16,7 @@ pub(super) struct Report {
     pub valid: usize,
     pub isolated: usize,
     pub filled: Option<usize>,
+    pub outline: Option<OutlineReport>,
     pub breaklines: Option<Breaklines>,
     pub grid_triangles: usize,
     pub method: &'static str,
@@ -43,6 +44,31 @@ pub(super) struct ErrorReport {
     pub surface: f64,
 }
 
+/// What became of an outline that was simplified.
+#[derive(Serialize)]
+pub(super) struct OutlineReport {
+    pub tolerance: f64,
+    pub corners: usize,
+    pub kept: usize,
+    pub dropped: usize,
+}
+
+impl OutlineReport {
+    pub(super) fn of(o: &Outlined, tolerance: f64) -> Self {
+        OutlineReport { tolerance, corners: o.corners, kept: o.kept, dropped: o.dropped }
+    }
+
+    pub(super) fn warning(&self) -> Option<String> {
+        (self.dropped > 0).then(|| {
+            format!(
+                "{} valid samples beside the outline are not covered: it was simplified by up to {} samples",
+                thousands(self.dropped),
+                short(self.tolerance)
+            )
+        })
+    }
+}
+
 #[derive(Serialize)]
 pub(super) struct Verified {
     pub good: bool,
@@ -56,6 +82,9 @@ pub(super) struct Verified {
     pub turned: usize,
     pub flat: usize,
     pub excess_area: i64,
+    pub dropped: usize,
+    pub overlapping: usize,
+    pub astray: usize,
 }
 
 impl Verified {
@@ -72,6 +101,9 @@ impl Verified {
             turned: v.turned,
             flat: v.flat,
             excess_area: v.excess_area,
+            dropped: v.dropped,
+            overlapping: v.overlapping,
+            astray: v.astray,
         }
     }
 }

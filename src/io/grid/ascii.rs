@@ -3,9 +3,10 @@
 //! Opening reads the file once and keeps where each band of rows begins, so that a window is read without what lies before it. (The crates
 //! there are read all of it into memory.)
 
+use super::bands::Bands;
 use super::source::{ReadAt, Stream, said};
 use super::{DecodeError, Facts, SampleType};
-use crate::terrain::{Affine, BlockCache, Georeference, Raster, RasterError, SampleAt, Window, check_window};
+use crate::terrain::{Affine, BlockCache, Georeference, Raster, RasterError, SampleAt, Window};
 use std::io::{BufRead, Seek, SeekFrom};
 use std::sync::Arc;
 
@@ -17,15 +18,9 @@ const LONGEST: usize = 64;
 /// A text grid.
 pub(super) struct Ascii {
     source: Arc<dyn ReadAt>,
-    columns: usize,
-    rows: usize,
-    /// Rows of a band.
-    band: usize,
+    bands: Bands,
     /// Where each band begins: byte and line.
     starts: Vec<(u64, usize)>,
-    cache: Arc<BlockCache>,
-    /// Whose blocks these are.
-    owner: usize,
 }
 
 /// Words of a text, with their places.
@@ -162,9 +157,9 @@ pub(super) fn open(
     let missing = |name: &str| at_line(first.1, format!("heights begin, but {name} was not said"));
     let columns = head.columns.ok_or_else(|| missing("ncols"))?;
     let rows = head.rows.ok_or_else(|| missing("nrows"))?;
-    let band = (BAND / columns).clamp(1, rows);
+    let bands = Bands::new(columns, rows, BAND / columns, cache);
     // Both are below 2^32.
-    let (needed, in_band) = (columns as u64 * rows as u64, columns as u64 * band as u64);
+    let (needed, in_band) = (columns as u64 * rows as u64, columns as u64 * bands.height as u64);
     let mut starts = vec![];
     let mut next = Some(first);
     let mut count = 0;
@@ -190,22 +185,18 @@ pub(super) fn open(
         warnings: vec![],
     };
     let georeference = head.georeference(rows);
-    Ok((
-        Ascii { source, columns, rows, band, starts, owner: cache.owner(), cache: cache.clone() },
-        georeference,
-        facts,
-    ))
+    Ok((Ascii { source, bands, starts }, georeference, facts))
 }
 
 impl Ascii {
     fn band_heights(&self, band: usize) -> Result<Vec<f64>, DecodeError> {
-        let rows = self.band.min(self.rows - band * self.band);
+        let count = self.bands.rows_of(band).len() * self.bands.columns;
         let (offset, line) = self.starts[band];
         let mut words = Words { line, ..Words::new(&self.source) };
         words.stream.seek(SeekFrom::Start(offset)).map_err(|e| at_line(line, said(&e)))?;
         // As many as were counted when it was opened.
-        let mut heights = Vec::with_capacity(rows * self.columns);
-        while heights.len() < rows * self.columns {
+        let mut heights = Vec::with_capacity(count);
+        while heights.len() < count {
             let at = words.next()?.ok_or_else(|| at_line(words.line, "the file has become shorter"))?;
             heights.push(words.number(at.1)?);
         }
@@ -215,39 +206,29 @@ impl Ascii {
 
 impl Raster for Ascii {
     fn columns(&self) -> usize {
-        self.columns
+        self.bands.columns
     }
 
     fn rows(&self) -> usize {
-        self.rows
+        self.bands.rows
     }
 
     fn block(&self) -> [usize; 2] {
-        [self.columns, self.band]
+        [self.bands.columns, self.bands.height]
     }
 
     fn read(&self, window: Window, out: &mut [f64]) -> Result<(), RasterError> {
-        check_window(self.columns, self.rows, window, Some(out.len()))?;
-        if out.is_empty() {
-            return Ok(());
-        }
-        let mut kept: Option<(usize, Arc<[f64]>)> = None;
-        for (line, row) in out.chunks_exact_mut(window.columns).zip(window.row..) {
-            let band = row / self.band;
-            let heights = match kept.take() {
-                Some((b, heights)) if b == band => heights,
-                _ => self.cache.get((self.owner, band), || self.band_heights(band)).map_err(|e| match e {
-                    DecodeError::Line { line, what } => {
-                        RasterError::Source { place: format!("line {line}"), what }
-                    }
-                    e => RasterError::Source { place: format!("row {row}"), what: e.to_string() },
-                })?,
-            };
-            let from = (row - band * self.band) * self.columns + window.column;
-            line.copy_from_slice(&heights[from..from + window.columns]);
-            kept = Some((band, heights));
-        }
-        Ok(())
+        self.bands.read(window, out, |band| {
+            self.band_heights(band).map_err(|e| match e {
+                DecodeError::Line { line, what } => {
+                    RasterError::Source { place: format!("line {line}"), what }
+                }
+                e => {
+                    let place = format!("row {}", self.bands.rows_of(band).start);
+                    RasterError::Source { place, what: e.to_string() }
+                }
+            })
+        })
     }
 }
 

@@ -4,6 +4,7 @@
 //! an announced size. Errors of decoding name the tile, the row or the line, and begin with the file's name.
 
 mod ascii;
+mod bands;
 mod checked;
 mod png;
 mod rows;

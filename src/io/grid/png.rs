@@ -1,9 +1,11 @@
 //! PNG: grey of 8 or 16 bits as heights, or colours that code heights. Rows are unpacked in order, in bands; going back begins anew.
 
+use super::bands::Bands;
 use super::source::{ReadAt, Stream};
 use super::{DecodeError, Encoding, Facts, SampleType};
-use crate::terrain::{BlockCache, Raster, RasterError, Window, check_window};
+use crate::terrain::{BlockCache, Raster, RasterError, Window};
 use png::{BitDepth, ColorType};
+use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Samples of a band of rows that are unpacked at once, about.
@@ -16,17 +18,11 @@ const MOST_COLUMNS: usize = 1 << 22;
 /// A picture of heights.
 pub(super) struct Picture {
     source: Arc<dyn ReadAt>,
-    columns: usize,
-    rows: usize,
+    bands: Bands,
     color: ColorType,
     wide: bool,
     encoding: Encoding,
     interlaced: bool,
-    /// Rows of a band.
-    band: usize,
-    cache: Arc<BlockCache>,
-    /// Whose blocks these are.
-    owner: usize,
     /// Where unpacking has got to, for whoever goes on from there.
     open: Mutex<Option<Unpacking>>,
 }
@@ -88,15 +84,11 @@ pub(super) fn open(
     }
     let picture = Picture {
         source,
-        columns,
-        rows,
+        bands: Bands::new(columns, rows, if interlaced { rows } else { BAND / columns }, cache),
         color,
         wide,
         encoding,
         interlaced,
-        band: if interlaced { rows } else { (BAND / columns).clamp(1, rows) },
-        owner: cache.owner(),
-        cache: cache.clone(),
         open: Mutex::new(Some(unpacking)),
     };
     if colored && !explicit {
@@ -119,7 +111,7 @@ pub(super) fn open(
 impl Picture {
     /// Fails where the first rows are no heights of the Earth in Terrain-RGB: an ordinary picture was given by mistake, or another code.
     fn check_colors(&self) -> Result<(), DecodeError> {
-        let window = Window::new(0, 0, self.columns, self.band.min(16));
+        let window = Window::new(0, 0, self.bands.columns, self.bands.height.min(16));
         let heights = self.window(window).map_err(|e| wrong(e.to_string()))?;
         match heights.heights().iter().find(|h| !h.is_nan() && !(-12_000.0..=9_700.0).contains(*h)) {
             None => Ok(()),
@@ -155,8 +147,8 @@ impl Picture {
 
     /// A band's heights.
     fn band_heights(&self, band: usize) -> Result<Vec<f64>, RasterError> {
-        let first = band * self.band;
-        let rows = self.band.min(self.rows - first);
+        let columns = self.bands.columns;
+        let Range { start: first, end } = self.bands.rows_of(band);
         let wrong = |row: usize, what: String| RasterError::Source { place: format!("row {row}"), what };
         // Taken out, so that another thread does not wait but begins anew.
         let kept = self.open.lock().unwrap_or_else(PoisonError::into_inner).take();
@@ -170,16 +162,16 @@ impl Picture {
             let size = at.reader.output_buffer_size().unwrap_or(0);
             let mut pixels = vec![0; size];
             at.reader.next_frame(&mut pixels).map_err(|e| wrong(0, e.to_string()))?;
-            out.resize(rows * self.columns, f64::NAN);
+            out.resize((end - first) * columns, f64::NAN);
             self.heights(&pixels, &mut out);
             return Ok(out);
         }
-        while at.row < first + rows {
+        while at.row < end {
             let row = at.reader.next_row().map_err(|e| wrong(at.row, e.to_string()))?;
             let Some(row) = row else { return Err(wrong(at.row, "the file ends before".into())) };
             if let Some(r) = at.row.checked_sub(first) {
-                out.resize((r + 1) * self.columns, f64::NAN);
-                self.heights(row.data(), &mut out[r * self.columns..]);
+                out.resize((r + 1) * columns, f64::NAN);
+                self.heights(row.data(), &mut out[r * columns..]);
             }
             at.row += 1;
         }
@@ -194,33 +186,18 @@ fn whole(pixel: &[u8]) -> i64 {
 
 impl Raster for Picture {
     fn columns(&self) -> usize {
-        self.columns
+        self.bands.columns
     }
 
     fn rows(&self) -> usize {
-        self.rows
+        self.bands.rows
     }
 
     fn block(&self) -> [usize; 2] {
-        [self.columns, self.band]
+        [self.bands.columns, self.bands.height]
     }
 
     fn read(&self, window: Window, out: &mut [f64]) -> Result<(), RasterError> {
-        check_window(self.columns, self.rows, window, Some(out.len()))?;
-        if out.is_empty() {
-            return Ok(());
-        }
-        let mut kept: Option<(usize, Arc<[f64]>)> = None;
-        for (line, row) in out.chunks_exact_mut(window.columns).zip(window.row..) {
-            let band = row / self.band;
-            let heights = match kept.take() {
-                Some((b, heights)) if b == band => heights,
-                _ => self.cache.get((self.owner, band), || self.band_heights(band))?,
-            };
-            let from = (row - band * self.band) * self.columns + window.column;
-            line.copy_from_slice(&heights[from..from + window.columns]);
-            kept = Some((band, heights));
-        }
-        Ok(())
+        self.bands.read(window, out, |band| self.band_heights(band))
     }
 }

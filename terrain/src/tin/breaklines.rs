@@ -153,12 +153,20 @@ impl Triangulation {
             (i128::from(c) + round(i128::from(d - c) * i128::from(part), i128::from(whole))) as i32
         };
         let p = if is_outline {
-            // Outlines run along rows, columns or diagonals, so a whole number of steps stays on them.
-            let steps = (d.0 - c.0).abs().max((d.1 - c.1).abs());
+            // One of the samples on it.
+            let (dx, dy) = (d.0 - c.0, d.1 - c.1);
+            let steps = divisor(dx.abs(), dy.abs());
             let k = along(0, steps);
-            (c.0 + (d.0 - c.0).signum() * k, c.1 + (d.1 - c.1).signum() * k)
+            (c.0 + dx / steps * k, c.1 + dy / steps * k)
         } else {
-            (along(c.0, d.0), along(c.1, d.1))
+            let (x, y) = (along(c.0, d.0), along(c.1, d.1));
+            let (right, last) = self.points[2];
+            match self.border_stays {
+                true if right < 2 || last < 2 => c,
+                // Where it is another's too, nothing is added.
+                true => (x.clamp(1, right - 1), y.clamp(1, last - 1)),
+                false => (x, y),
+            }
         };
         let mut pieces = vec![[p, b], [a, p]];
         if area(c, d, p) == 0 {
@@ -240,6 +248,11 @@ impl Triangulation {
         sides.sort_unstable();
         sides
     }
+}
+
+/// The greatest common divisor; one of the two is not 0.
+fn divisor(a: i32, b: i32) -> i32 {
+    if b == 0 { a } else { divisor(b, a % b) }
 }
 
 #[cfg(test)]

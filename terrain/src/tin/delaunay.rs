@@ -23,6 +23,10 @@ pub(super) struct Triangulation {
     /// Triangles changed since the list was last emptied; some twice.
     pub changed: Vec<u32>,
     pub(super) stack: Vec<u32>,
+    /// Triangles around a new vertex that may not be Delaunay.
+    fan: Vec<u32>,
+    /// Whether lines that are led over a sample must not make new vertices on the border of the rectangle: another triangulation has it too.
+    pub(super) border_stays: bool,
     /// Where the last walk ended.
     pub(super) last: u32,
     wide: bool,
@@ -60,20 +64,23 @@ impl Triangulation {
             outside: vec![],
             changed: vec![0, 1],
             stack: vec![],
+            fan: vec![],
+            border_stays: false,
             last: 0,
             // Within this, an in-circle determinant fits 64 bits: differences of 14 bits, squares of 29, products of 58.
             wide: columns.max(rows) > 1 << 14,
         }
     }
 
+    #[inline]
     pub(super) fn triangles(&self) -> usize {
         self.corner.len() / 3
     }
 
     #[inline]
     pub(super) fn corners(&self, t: u32) -> [u32; 3] {
-        let i = 3 * t as usize;
-        [self.corner[i], self.corner[i + 1], self.corner[i + 2]]
+        let c = &self.corner[3 * t as usize..3 * t as usize + 3];
+        [c[0], c[1], c[2]]
     }
 
     #[inline]
@@ -93,10 +100,12 @@ impl Triangulation {
         self.across[side as usize] & FIXED != 0
     }
 
+    #[inline]
     pub(super) fn is_outside(&self, t: u32) -> bool {
         !self.outside.is_empty() && self.outside[t as usize]
     }
 
+    #[inline]
     pub(super) fn link(&mut self, a: u32, b: u32, fixed: bool) {
         let fixed = if fixed { FIXED } else { 0 };
         self.across[a as usize] = b | fixed;
@@ -112,10 +121,11 @@ impl Triangulation {
     }
 
     /// Adds a triangle, not yet linked.
+    #[inline]
     fn add(&mut self, corners: [u32; 3], outside: bool) -> u32 {
         let t = self.triangles() as u32;
-        self.corner.extend(corners);
-        self.across.extend([HULL; 3]);
+        self.corner.extend_from_slice(&corners);
+        self.across.extend_from_slice(&[HULL; 3]);
         if !self.outside.is_empty() {
             self.outside.push(outside);
         }
@@ -124,30 +134,30 @@ impl Triangulation {
 
     /// Inserts a vertex in a triangle that holds it, not at a corner; returns it. O(1) and the flips.
     pub(super) fn insert_in(&mut self, t: u32, p: (i32, i32)) -> u32 {
-        for i in 0..3 {
-            let s = 3 * t + i;
-            if area(self.point(s), self.point(next(s)), p) == 0 {
-                return self.insert_on(s, p);
+        let [a, b, c] = self.corners(t);
+        let (pa, pb, pc) = (self.points[a as usize], self.points[b as usize], self.points[c as usize]);
+        for (i, from, to) in [(0, pa, pb), (1, pb, pc), (2, pc, pa)] {
+            if area(from, to, p) == 0 {
+                return self.insert_on(3 * t + i, p);
             }
         }
         let v = self.points.len() as u32;
         self.points.push(p);
-        let [a, b, c] = self.corners(t);
-        let (s1, s2) = (3 * t + 1, 3 * t + 2);
+        let s = 3 * t;
         let outside = self.is_outside(t);
-        let (bc, ca) = (self.across[s1 as usize], self.across[s2 as usize]);
-        // t keeps its first side.
+        let (bc, ca) = (self.across[s as usize + 1], self.across[s as usize + 2]);
+        // t keeps its first side; the new vertex is the last corner of all three.
         let t1 = self.add([b, c, v], outside);
         let t2 = self.add([c, a, v], outside);
-        self.corner[3 * t as usize + 2] = v;
-        self.link(3 * t1, bc & !FIXED, bc & FIXED != 0);
-        self.link(3 * t2, ca & !FIXED, ca & FIXED != 0);
-        self.link(s1, 3 * t1 + 2, false);
+        self.corner[s as usize + 2] = v;
+        self.link_as(3 * t1, bc);
+        self.link_as(3 * t2, ca);
+        self.link(s + 1, 3 * t1 + 2, false);
         self.link(3 * t1 + 1, 3 * t2 + 2, false);
-        self.link(3 * t2 + 1, s2, false);
-        self.changed.extend([t, t1, t2]);
-        self.stack.extend([3 * t, 3 * t1, 3 * t2]);
-        self.flip_all();
+        self.link(3 * t2 + 1, s + 2, false);
+        self.changed.extend_from_slice(&[t, t1, t2]);
+        self.fan.extend_from_slice(&[t, t1, t2]);
+        self.legalize();
         v
     }
 
@@ -157,49 +167,83 @@ impl Triangulation {
         self.points.push(p);
         let fixed = self.is_fixed(side);
         let other = self.across(side);
-        let (s, far_s) = self.halve(side, v);
+        // a -> v and v -> b on the left, b -> v and v -> a on the right.
+        let (av, vb) = self.halve(side, v);
         if other != HULL {
-            let (o, far_o) = self.halve(other, v);
-            self.link(s, far_o, fixed);
-            self.link(far_s, o, fixed);
+            let (bv, va) = self.halve(other, v);
+            self.link(av, va, fixed);
+            self.link(vb, bv, fixed);
         } else {
-            self.link(s, HULL, fixed);
-            self.link(far_s, HULL, fixed);
+            self.link(av, HULL, fixed);
+            self.link(vb, HULL, fixed);
         }
-        self.flip_all();
+        self.legalize();
         v
     }
 
-    /// Cuts the triangle of a side `a -> b` at a new vertex on it. Returns the sides `a -> v` and `v -> b`, not yet linked.
+    /// Cuts the triangle of a side `a -> b` at a new vertex on it, the last corner of both triangles. Returns the sides `a -> v` and `v -> b`, not yet
+    /// linked.
     fn halve(&mut self, side: u32, v: u32) -> (u32, u32) {
         let t = side / 3;
         let (bc, ca) = (next(side), previous(side));
-        let (b, c) = (self.corner[bc as usize], self.corner[ca as usize]);
+        let [a, b, c] = [side, bc, ca].map(|s| self.corner[s as usize]);
+        let [beyond_bc, beyond_ca] = [bc, ca].map(|s| self.across[s as usize]);
         let outside = self.is_outside(t);
-        let beyond = self.across[bc as usize];
-        let n = self.add([v, b, c], outside);
-        self.corner[bc as usize] = v;
-        self.link(3 * n + 1, beyond & !FIXED, beyond & FIXED != 0);
-        self.link(bc, 3 * n + 2, false);
-        self.changed.extend([t, n]);
-        self.stack.extend([ca, 3 * n + 1]);
-        (side, 3 * n)
+        let n = self.add([b, c, v], outside);
+        let s = 3 * t;
+        self.corner[s as usize..s as usize + 3].copy_from_slice(&[c, a, v]);
+        self.link_as(s, beyond_ca);
+        self.link_as(3 * n, beyond_bc);
+        self.link(s + 2, 3 * n + 1, false);
+        self.changed.extend_from_slice(&[t, n]);
+        self.fan.extend_from_slice(&[t, n]);
+        (s + 1, 3 * n + 2)
     }
 
-    /// Flips until the sides on the stack, and those that come up, are locally Delaunay.
-    pub(super) fn flip_all(&mut self) {
-        while let Some(side) = self.stack.pop() {
-            let across = self.across[side as usize];
-            if across & FIXED != 0 || across == HULL {
+    /// Links a side to what another had across, [`FIXED`] or not.
+    #[inline]
+    fn link_as(&mut self, side: u32, across: u32) {
+        self.across[side as usize] = across;
+        let other = across & !FIXED;
+        if other != HULL {
+            self.across[other as usize] = side | across & FIXED;
+        }
+    }
+
+    /// Flips until the triangles around a new vertex, their last corner, are Delaunay: those of `fan`, and those that flips give it.
+    fn legalize(&mut self) {
+        while let Some(t) = self.fan.pop() {
+            let s = 3 * t as usize;
+            let across = self.across[s];
+            // Fixed, or the border of the rectangle.
+            if across >= HULL {
                 continue;
             }
-            let (p, a) = (self.point(previous(side)), self.point(side));
-            let (b, q) = (self.point(next(side)), self.point(previous(across)));
-            if self.in_circle(p, a, b, q) {
-                self.flip(side);
-                // The two sides away from the new vertex, which is the third corner of `side`'s triangle.
-                self.stack.extend([side, previous(across & !FIXED)]);
+            let o = across / 3;
+            let (o0, at) = (3 * o as usize, across - 3 * o);
+            // across leads from b to a; then a to q, q to b.
+            let (aq, qb) = match at {
+                0 => (o0 + 1, o0 + 2),
+                1 => (o0 + 2, o0),
+                _ => (o0, o0 + 1),
+            };
+            let (a, b, v, q) = (self.corner[s], self.corner[s + 1], self.corner[s + 2], self.corner[qb]);
+            let point = |v: u32| self.points[v as usize];
+            if !self.in_circle(point(v), point(a), point(b), point(q)) {
+                continue;
             }
+            let (beyond_aq, beyond_qb, beyond_bv) = (self.across[aq], self.across[qb], self.across[s + 1]);
+            // (a, q, v), which keeps v -> a, and (q, b, v).
+            self.corner[s + 1] = q;
+            self.corner[o0..o0 + 3].copy_from_slice(&[q, b, v]);
+            self.link_as(3 * t, beyond_aq);
+            self.link_as(3 * o, beyond_qb);
+            self.link_as(3 * o + 1, beyond_bv);
+            self.link(3 * t + 1, 3 * o + 2, false);
+            // The other is listed already.
+            self.changed.push(o);
+            self.fan.push(t);
+            self.fan.push(o);
         }
     }
 
@@ -222,6 +266,7 @@ impl Triangulation {
     }
 
     /// Whether `q` lies within the circle through `a`, `b`, `c`, which turn to the left.
+    #[inline]
     pub(super) fn in_circle(&self, a: (i32, i32), b: (i32, i32), c: (i32, i32), q: (i32, i32)) -> bool {
         let d = |p: (i32, i32)| (i64::from(p.0 - q.0), i64::from(p.1 - q.1));
         let ((ax, ay), (bx, by), (cx, cy)) = (d(a), d(b), d(c));

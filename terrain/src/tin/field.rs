@@ -8,6 +8,9 @@ pub(super) const VOID: i32 = i32::MIN;
 /// Heights never exceed this many quanta, which f32 holds exactly.
 const MOST: f64 = 16_777_214.0;
 
+/// f64s about this have no fractions.
+const TO_WHOLE: f64 = 6_755_399_441_055_744.0;
+
 /// Fractions of a quantum in which the tolerance is counted.
 const FRACTION_BITS: u32 = 8;
 
@@ -33,23 +36,30 @@ impl Field {
         let greatest = grid.range().map_or(0.0, |(l, g)| l.abs().max(g.abs())) + error;
         let mut quantum = 1.0f64;
         // Powers of two, within the normal numbers of both f32 and f64.
-        while greatest / quantum > MOST {
+        while greatest / quantum > MOST && quantum < 1e300 {
             quantum *= 2.0;
         }
         while greatest / (quantum / 2.0) <= MOST && quantum > 1e-30 {
             quantum /= 2.0;
         }
-        let mut rounding = 0.0f64;
+        // A quantum is a power of two, so that this is exact.
+        let (inverse, mut rounding) = (1.0 / quantum, 0.0f64);
         let quanta = |&z: &f64| {
-            if z.is_nan() {
-                return VOID;
-            }
-            let h = (z / quantum).round();
-            rounding = rounding.max((z - h * quantum).abs());
-            h as i32
+            let scaled = z * inverse;
+            // To the nearest whole number, as long as there are fewer than 2^51 quanta; NaN stays NaN.
+            let whole = (scaled + TO_WHOLE) - TO_WHOLE;
+            let off = (scaled - whole).abs();
+            rounding = if off > rounding { off } else { rounding };
+            if whole.is_nan() { VOID } else { whole as i32 }
         };
         let h = grid.heights().iter().map(quanta).collect();
-        Field { columns: grid.columns() as i32, rows: grid.rows() as i32, h, quantum, rounding }
+        Field {
+            columns: grid.columns() as i32,
+            rows: grid.rows() as i32,
+            h,
+            quantum,
+            rounding: rounding * quantum,
+        }
     }
 
     /// A part of it, with the same quantum: what several parts share has the same height in all.
@@ -78,11 +88,13 @@ impl Field {
         (i64::from(greatest) - i64::from(least)) as f64 * self.quantum
     }
 
+    #[inline]
     pub(super) fn index(&self, x: i32, y: i32) -> usize {
         y as usize * self.columns as usize + x as usize
     }
 
     /// The height at a sample, in quanta.
+    #[inline]
     pub(super) fn at(&self, x: i32, y: i32) -> i32 {
         self.h[self.index(x, y)]
     }

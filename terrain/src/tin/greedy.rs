@@ -6,7 +6,7 @@ use super::delaunay::Triangulation;
 use super::field::{Field, Tolerance};
 use super::queue::Buckets;
 use super::region::Region;
-use super::scan::{Corner, Crossing, crossings, farthest};
+use super::scan::{Corner, Crossing, beyond, crossings};
 
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
@@ -18,8 +18,9 @@ pub(super) struct Goal {
     pub triangles: usize,
 }
 
-/// No sample.
+/// No sample, and a triangle that is to be looked at.
 const NONE: u32 = u32::MAX;
+const LISTED: u32 = u32::MAX - 1;
 
 /// Makes lines sides, and inserts samples until all lie within the tolerance. `None` when cancelled.
 ///
@@ -100,10 +101,10 @@ pub(super) fn refine(
     goal: Goal,
     control: &dyn Control,
 ) -> Option<()> {
-    let corner = |mesh: &Triangulation, v: u32| {
-        let (x, y) = mesh.points[v as usize];
-        Corner { x, y, z: field.at(x, y) }
-    };
+    let columns = field.columns as usize;
+    // Vertices with their heights, so that a triangle needs no look at the grid but for its samples.
+    let corner = |&(x, y): &(i32, i32)| Corner { x, y, z: field.at(x, y) };
+    let mut corners: Vec<Corner> = mesh.points.iter().map(corner).collect();
     let mut candidate: Vec<u32> = vec![];
     let mut queue = Buckets::default();
     let mut inside = (0..mesh.triangles() as u32).filter(|&t| !mesh.is_outside(t)).count();
@@ -111,24 +112,23 @@ pub(super) fn refine(
     let mut steps = 0usize;
     loop {
         candidate.resize(mesh.triangles(), NONE);
-        changed.append(&mut mesh.changed);
         // Each once: a triangle is listed for every flip it took part in.
         for &t in &changed {
-            candidate[t as usize] = NONE - 1;
+            candidate[t as usize] = LISTED;
         }
         for t in changed.drain(..) {
-            if candidate[t as usize] != NONE - 1 {
+            if candidate[t as usize] != LISTED {
                 continue;
             }
             candidate[t as usize] = NONE;
             if mesh.is_outside(t) {
                 continue;
             }
-            let [a, b, c] = mesh.corners(t).map(|v| corner(mesh, v));
-            let far = farthest(field, a, b, c);
-            if !far.within(goal.tolerance) {
+            let [a, b, c] = mesh.corners(t);
+            let triangle = [corners[a as usize], corners[b as usize], corners[c as usize]];
+            if let Some(far) = beyond(field, goal.tolerance, triangle) {
                 candidate[t as usize] = far.sample;
-                queue.push((far.miss as f64 / far.area as f64) as f32, (t, far.sample));
+                queue.push(far.miss as f32 / far.area as f32, (t, far.sample));
             }
         }
         let next = loop {
@@ -149,10 +149,11 @@ pub(super) fn refine(
             }
             control.progress(steps as f64 / (steps + queue.len()) as f64);
         }
-        let sample = sample as usize;
-        let p = ((sample % field.columns as usize) as i32, (sample / field.columns as usize) as i32);
+        let p = ((sample as usize % columns) as i32, (sample as usize / columns) as i32);
         let before = mesh.triangles();
         mesh.insert_in(t, p);
+        corners.push(Corner { x: p.0, y: p.1, z: field.h[sample as usize] });
         inside += (before..mesh.triangles()).filter(|&t| !mesh.is_outside(t as u32)).count();
+        std::mem::swap(&mut changed, &mut mesh.changed);
     }
 }

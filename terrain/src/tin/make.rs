@@ -3,9 +3,10 @@
 use super::blocks::Pass;
 use super::breaklines::Placed;
 use super::field::{Field, Tolerance};
+use super::frame::{greedy_in_parts, has_parts};
 use super::greedy::{Goal, greedy};
 use super::network::Network;
-use super::options::{Contract, Control, Made, Method, Options, TinError};
+use super::options::{Contract, Control, Made, Method, Options, Outlined, TinError};
 use super::patch::Rules;
 use super::region::Region;
 use super::regular::regular;
@@ -32,11 +33,20 @@ pub fn triangulate(grid: &Grid, options: &Options, control: &dyn Control) -> Res
     if !(error >= 0.0 && error.is_finite()) {
         return Err(TinError::BadError);
     }
-    let lines = lines(grid, options)?;
+    let lines = breaklines(grid, options)?;
+    let known = matches!(options.method, Method::Greedy | Method::Best);
+    match options.outline_tolerance {
+        Some(_) if !known || options.contract != Contract::Samples => return Err(TinError::NoOutline),
+        Some(t) if !(t >= 0.0 && t.is_finite()) => return Err(TinError::BadOutline),
+        _ => {}
+    }
     let field = Field::new(grid, error);
-    let region = Region::new(&field);
+    let mut region = Region::new(&field);
     if region.triangles == 0 {
         return Err(TinError::Nothing);
+    }
+    if let Some(tolerance) = options.outline_tolerance {
+        region.simplify_outline(&field, tolerance);
     }
     let work = Work { field: &field, region: &region, lines: &lines, placed: Cell::default(), control };
     let (network, step) = match (options.max_error, options.triangles) {
@@ -54,15 +64,20 @@ pub fn triangulate(grid: &Grid, options: &Options, control: &dyn Control) -> Res
             }
         }
     };
-    let errors = network.errors(&field, grid.heights());
+    let outline = region.simplified.as_ref().map(|outline| Outlined {
+        corners: outline.corners,
+        kept: outline.sides.len(),
+        dropped: network.dropped(&field, &region),
+    });
+    let errors = network.errors(&field, grid.heights(), outline.is_some());
     let tin = network.into_tin(&field, [0, 0]);
     let (valid, isolated, grid_triangles) = (region.valid, region.isolated, region.triangles);
     let Placed { bent, outside } = work.placed.get();
-    Ok(Made { tin, errors, valid, isolated, grid_triangles, step, bent, outside })
+    Ok(Made { tin, errors, valid, isolated, grid_triangles, step, bent, outside, outline })
 }
 
 /// The breaklines, checked.
-fn lines(grid: &Grid, options: &Options) -> Result<Vec<[(i32, i32); 2]>, TinError> {
+pub(super) fn breaklines(grid: &Grid, options: &Options) -> Result<Vec<[(i32, i32); 2]>, TinError> {
     let known = matches!(options.method, Method::Greedy | Method::Best);
     if !options.breaklines.is_empty() && (!known || options.contract != Contract::Samples) {
         return Err(TinError::NoBreaklines);
@@ -193,8 +208,13 @@ impl Work<'_> {
     }
 
     fn best(&self, rules: Rules) -> Option<Network> {
-        let mut network =
-            self.greedy(Goal { tolerance: rules.tolerance, surface: rules.surface, triangles: usize::MAX })?;
+        let Rules { tolerance, surface, .. } = rules;
+        let whole = surface || !self.lines.is_empty() || self.region.simplified.is_some();
+        let mut network = if whole || !has_parts(self.field) {
+            self.greedy(Goal { tolerance, surface, triangles: usize::MAX })?
+        } else {
+            greedy_in_parts(self.field, self.region, tolerance, self.control)?
+        };
         better(&mut network, self.field, rules, self.control)?;
         Some(network)
     }

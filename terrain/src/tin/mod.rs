@@ -5,8 +5,8 @@
 //! are returned. f32 holds them, so what is written is what was proven.
 //!
 //! The valid region is the union of the grid triangles whose three corners are valid, where the diagonal of a cell runs from `(x, y)` to
-//! `(x + 1, y + 1)`. A network covers it exactly: its outline is that region's, point for point. Valid samples that belong to no
-//! such triangle are isolated; they are counted and covered by nothing.
+//! `(x + 1, y + 1)`. A network covers it exactly: its outline is that region's, point for point, or with [`Options::outline_tolerance`] a simpler one. Valid
+//! samples that belong to no such triangle are isolated; they are counted and, under the exact outline, covered by nothing.
 //!
 //! ```
 //! use progmesh_terrain::Grid;
@@ -19,18 +19,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod astray;
 mod blocks;
 mod borders;
 mod breaklines;
 mod delaunay;
 mod field;
 mod fill;
+mod frame;
 mod greedy;
 mod heights;
+mod lattice;
 mod line;
 mod make;
 mod network;
 mod options;
+mod outline;
 mod parallel;
 mod patch;
 mod queue;
@@ -44,6 +48,6 @@ mod verify;
 
 pub use borders::Borders;
 pub use make::triangulate;
-pub use options::{Contract, Control, Errors, Made, Method, Options, Quiet, Tin, TinError};
+pub use options::{Contract, Control, Errors, Made, Method, Options, Outlined, Quiet, Tin, TinError};
 pub use tiles::{Cuts, Level, Tiling};
-pub use verify::{Verdict, lines_missing, verify};
+pub use verify::{Verdict, lines_missing, verify, verify_outline};

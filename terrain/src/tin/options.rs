@@ -64,6 +64,11 @@ pub struct Options {
     /// [`Method::Best`], and an error at the samples. Where lines cross between samples both are led over the nearest one; where one leaves the
     /// valid region it ends at the outline.
     pub breaklines: Vec<[[u32; 2]; 2]>,
+    /// The outline of the valid region may differ from the exact one by as many samples (steps of the grid): corners of it are left out as long as both
+    /// lie within that of each other and no void sample is covered. Valid samples beside it may lose their cover
+    /// ([`Outlined::dropped`]), isolated ones may get one; the error holds for all that are covered. What lies on the border of the grid stays. Only
+    /// for [`Method::Greedy`] and [`Method::Best`], and an error at the samples: along a side of a simpler outline no vertex could mend the error between them.
+    pub outline_tolerance: Option<f64>,
 }
 
 impl Options {
@@ -85,6 +90,13 @@ impl Options {
     #[must_use]
     pub fn with_breaklines(mut self, breaklines: Vec<[[u32; 2]; 2]>) -> Self {
         self.breaklines = breaklines;
+        self
+    }
+
+    /// With an outline within this many samples of the exact one.
+    #[must_use]
+    pub fn with_outline_tolerance(mut self, tolerance: f64) -> Self {
+        self.outline_tolerance = Some(tolerance);
         self
     }
 
@@ -152,6 +164,20 @@ pub struct Made {
     pub bent: usize,
     /// Pieces of breaklines left out, where nothing is valid.
     pub outside: usize,
+    /// The outline, if it was to be simplified and there are voids.
+    pub outline: Option<Outlined>,
+}
+
+/// What became of an outline that was simplified.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Outlined {
+    /// Corners of the exact outline.
+    pub corners: usize,
+    /// Those of them that are left.
+    pub kept: usize,
+    /// Valid samples, not isolated, that nothing covers any more.
+    pub dropped: usize,
 }
 
 /// Why there is no network.
@@ -193,8 +219,16 @@ pub enum TinError {
     /// A breakline with an end that is no sample.
     #[error("the breakline from column {} row {} to column {} row {} leaves the grid", .0[0][0], .0[0][1], .0[1][0], .0[1][1])]
     BadBreakline([[u32; 2]; 2]),
-    /// Tiles of another method than greedy insertion and the best, or with an error between samples.
-    #[error("tiles are made by the methods greedy and best, with an error at the samples")]
+    /// An outline simplified with another method, or with an error between samples.
+    #[error("an outline is simplified by the methods greedy and best, with an error at the samples")]
+    NoOutline,
+    /// A tolerance of the outline that is not a number, or negative.
+    #[error("the tolerance of the outline must be a number, 0 or more")]
+    BadOutline,
+    /// Tiles of another method than greedy insertion and the best, with an error between samples, or with an outline that is simplified.
+    #[error(
+        "tiles are made by the methods greedy and best, with an error at the samples and the exact outline"
+    )]
     NoTiles,
     /// Cuts that are not in ascending order from the first to the last sample, or a tile that is none.
     #[error("cuts must ascend from the first column and row to the last, and a tile lie between two of them")]

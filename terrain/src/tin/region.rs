@@ -3,6 +3,7 @@
 
 use super::delaunay::{HULL, Triangulation};
 use super::field::{Field, VOID};
+use super::outline::Outline;
 
 /// The triangle of a cell that has its corner `(x + 1, y)`.
 const FIRST: u8 = 1;
@@ -21,6 +22,8 @@ pub(super) struct Region {
     pub valid: usize,
     /// Valid triangles.
     pub triangles: usize,
+    /// The outline to keep instead of the exact one.
+    pub simplified: Option<Outline>,
 }
 
 /// A straight run of the outline, or a part of one, between two of its corners.
@@ -32,7 +35,15 @@ impl Region {
         let (columns, rows) = (field.columns, field.rows);
         let count = (i64::from(columns - 1).max(0) * i64::from(rows - 1).max(0)) as usize;
         let valid = field.h.iter().filter(|&&h| h != VOID).count();
-        let mut region = Region { columns, rows, cells: vec![], isolated: 0, valid, triangles: 2 * count };
+        let mut region = Region {
+            columns,
+            rows,
+            cells: vec![],
+            isolated: 0,
+            valid,
+            triangles: 2 * count,
+            simplified: None,
+        };
         if valid == field.h.len() && count > 0 {
             return region;
         }
@@ -117,6 +128,35 @@ impl Region {
         around.into_iter().any(|(dx, dy, bits)| self.has(x + dx, y + dy, bits))
     }
 
+    /// Keeps an outline within this many samples of the exact one.
+    pub(super) fn simplify_outline(&mut self, field: &Field, tolerance: f64) {
+        if !self.is_full() {
+            self.simplified = Some(Outline::simplified(field, self, tolerance));
+        }
+    }
+
+    /// The exact outline in steps from sample to sample, what is valid to their left: where each starts, and its direction: 0 along the axis of
+    /// columns, 1 along the diagonal, 2 along the axis of rows, and 3, 4, 5 back. O(samples).
+    pub(super) fn outline_steps(&self) -> Vec<((i32, i32), u8)> {
+        let mut steps = vec![];
+        let mut step =
+            |left: bool, right: bool, from: (i32, i32), to: (i32, i32), direction: u8| match (left, right) {
+                (true, false) => steps.push((from, direction)),
+                (false, true) => steps.push((to, direction + 3)),
+                _ => {}
+            };
+        for y in 0..self.rows {
+            for x in 0..self.columns {
+                let [below, above] = self.beside_row(x, y);
+                step(above, below, (x, y), (x + 1, y), 0);
+                step(self.has(x, y, SECOND), self.has(x, y, FIRST), (x, y), (x + 1, y + 1), 1);
+                let [left, right] = self.beside_column(x, y);
+                step(left, right, (x, y), (x, y + 1), 2);
+            }
+        }
+        steps
+    }
+
     /// The outline in straight runs that meet others at most at their ends. O(samples).
     pub(super) fn outline(&self) -> Vec<Run> {
         let mut runs = vec![];
@@ -176,6 +216,9 @@ impl Region {
     pub(super) fn constrain(&self, mesh: &mut Triangulation) {
         if self.is_full() {
             return;
+        }
+        if let Some(outline) = &self.simplified {
+            return outline.constrain(mesh);
         }
         let mut runs = self.outline();
         let mut points: Vec<(i32, i32)> = runs.iter().flatten().copied().collect();

@@ -1,13 +1,18 @@
 //! Tiles: networks beside each other that share their borders to the bit, at every level.
 //!
-//! What a border looks like follows from the samples on it, the level's error, and where voids lie beside it; never from what is inside of
-//! a tile. So tiles can be made in any order, on any machine, and fit.
+//! What a border looks like follows from the samples on it, the level's error, where voids lie beside it, and where breaklines reach it; never from
+//! what is inside of a tile. So tiles can be made in any order, on any machine, and fit.
+//!
+//! That is why the error of tiles holds at the samples only. Between them a triangle on a border is judged along every edge of the grid from the
+//! border's samples to those beside it; with long sides on the border and each sample beside it a vertex, no choice of triangles may keep
+//! the error there, and a vertex more on the border would have to be one of the neighbour as well, which does not know these samples.
 
-use super::delaunay::Triangulation;
+use super::breaklines::Placed;
 use super::field::{Field, Tolerance};
+use super::frame::{Frame, Part};
 use super::greedy::{Goal, refine};
 use super::line;
-use super::make::{better, too_fine};
+use super::make::{better, breaklines, too_fine};
 use super::network::Network;
 use super::options::{Contract, Control, Made, Method, Options, TinError};
 use super::patch::{Rules, Spread};
@@ -79,14 +84,16 @@ pub struct Tiling<'a> {
     options: Options,
     field: Field,
     region: Region,
+    lines: Vec<[(i32, i32); 2]>,
 }
 
 impl<'a> Tiling<'a> {
     /// Tiles by [`Method::Greedy`] or [`Method::Best`], with errors at the samples, none of them above `coarsest`. `options.max_error` and
-    /// `options.triangles` are not looked at: [`Tiling::level`] has an error. O(samples).
+    /// `options.triangles` are not looked at: [`Tiling::level`] has an error. Breaklines become sides, led over the nearest sample where they
+    /// cross borders. O(samples).
     ///
     /// # Errors
-    /// [`TinError`]; [`TinError::NoTiles`] for other methods and contracts.
+    /// [`TinError`]; [`TinError::NoTiles`] for other methods and contracts, and for an outline that is simplified.
     pub fn new(grid: &'a Grid, options: &Options, coarsest: f64) -> Result<Self, TinError> {
         let (columns, rows) = (grid.columns(), grid.rows());
         if columns.max(rows) > 65_535 || columns * rows >= u32::MAX as usize {
@@ -96,15 +103,16 @@ impl<'a> Tiling<'a> {
             return Err(TinError::BadError);
         }
         let known = matches!(options.method, Method::Greedy | Method::Best);
-        if !known || options.contract != Contract::Samples || !options.breaklines.is_empty() {
+        if !known || options.contract != Contract::Samples || options.outline_tolerance.is_some() {
             return Err(TinError::NoTiles);
         }
+        let lines = breaklines(grid, options)?;
         let field = Field::new(grid, coarsest);
         let region = Region::new(&field);
         if region.triangles == 0 {
             return Err(TinError::Nothing);
         }
-        Ok(Tiling { grid, options: options.clone(), field, region })
+        Ok(Tiling { grid, options: options.clone(), field, region, lines })
     }
 
     /// Valid samples, and those of them that no triangle of three valid neighbours has.
@@ -140,69 +148,32 @@ impl<'a> Tiling<'a> {
             return Err(TinError::BadCuts);
         }
         let tolerance = self.field.tolerance(error).ok_or_else(|| too_fine(self.grid, &self.field, error))?;
-        let (field, region) = (&self.field, &self.region);
-        let along = |cuts: &[usize],
-                     ends: &[usize],
-                     at: &dyn Fn(i32, i32) -> i32,
-                     beside: &dyn Fn(i32, i32) -> [bool; 2]| {
-            let line = |&c: &usize| {
-                let c = c as i32;
-                border(ends, tolerance, spread, &|k| at(c, k), &|k| beside(c, k))
-            };
-            cuts.iter().map(line).collect::<Vec<_>>()
-        };
-        let columns =
-            along(&cuts.columns, &cuts.rows, &|x, y| field.at(x, y), &|x, y| region.beside_column(x, y));
-        let rows = along(&cuts.rows, &cuts.columns, &|y, x| field.at(x, y), &|y, x| region.beside_row(x, y));
-        Ok(Level { tiling: self, cuts, tolerance, spread: spread.clamp(1, 1 << 20), columns, rows })
+        let spread = spread.clamp(1, 1 << 20);
+        let frame = Frame::new((&self.field, &self.region), cuts, tolerance, spread, &self.lines);
+        Ok(Level { tiling: self, frame, tolerance, spread })
     }
-}
-
-/// The vertices along a line: where tiles meet, where what lies beside it begins or ends, and the fewest between.
-fn border(
-    ends: &[usize],
-    tolerance: Tolerance,
-    spread: usize,
-    at: &dyn Fn(i32) -> i32,
-    beside: &dyn Fn(i32) -> [bool; 2],
-) -> Vec<i32> {
-    let mut vertices = vec![];
-    for pair in ends.windows(2) {
-        let (first, last) = (pair[0] as i32, pair[1] as i32);
-        let mut from = first;
-        while from < last {
-            let kind = beside(from);
-            let to = (from + 1..last).find(|&k| beside(k) != kind).unwrap_or(last);
-            if kind != [false, false] {
-                let heights: Vec<i32> = (from..=to).map(at).collect();
-                vertices
-                    .extend(line::simplify(&heights, tolerance, spread).into_iter().map(|k| from + k as i32));
-            }
-            from = to;
-        }
-    }
-    vertices.dedup();
-    vertices
 }
 
 /// The tiles of a level.
 #[derive(Clone, Debug)]
 pub struct Level<'a> {
     tiling: &'a Tiling<'a>,
-    cuts: Cuts,
+    frame: Frame,
     tolerance: Tolerance,
     spread: usize,
-    /// Rows of the vertices on each cut by a column.
-    columns: Vec<Vec<i32>>,
-    /// Columns of those on each cut by a row.
-    rows: Vec<Vec<i32>>,
 }
 
 impl Level<'_> {
     /// Where it is cut.
     #[must_use]
     pub fn cuts(&self) -> &Cuts {
-        &self.cuts
+        &self.frame.cuts
+    }
+
+    /// Places where a breakline was led over the nearest sample of a cut that it crosses between samples.
+    #[must_use]
+    pub fn bent(&self) -> usize {
+        self.frame.bent
     }
 
     /// Makes a tile: vertices by column and row of the whole grid. `None` where no three neighbouring samples of it are valid. Counts of
@@ -210,31 +181,14 @@ impl Level<'_> {
     ///
     /// # Errors
     /// [`TinError::Cancelled`]; [`TinError::BadCuts`] if there is no such tile.
-    pub fn tile(&self, [i, j]: [usize; 2], control: &dyn Control) -> Result<Option<Made>, TinError> {
-        let [across, down] = self.cuts.tiles();
-        if i >= across || j >= down {
+    pub fn tile(&self, tile: [usize; 2], control: &dyn Control) -> Result<Option<Made>, TinError> {
+        let [across, down] = self.cuts().tiles();
+        if tile[0] >= across || tile[1] >= down {
             return Err(TinError::BadCuts);
         }
-        let window = self.cuts.window([i, j]);
-        let [x0, y0] = [window.column, window.row];
-        let [x1, y1] = [x0 + window.columns - 1, y0 + window.rows - 1];
-        let field = self.tiling.field.part([x0, y0].map(|c| c as i32), [x1, y1].map(|c| c as i32));
-        let region = Region::new(&field);
-        if region.triangles == 0 {
-            return Ok(None);
-        }
-        let mut mesh = Triangulation::new(field.columns, field.rows);
-        let within = |line: &[i32], from: usize, to: usize| -> Vec<i32> {
-            let (from, to) = (from as i32, to as i32);
-            line.iter().filter(|&&k| from <= k && k <= to).map(|k| k - from).collect()
-        };
-        for (x, cut) in [(0, i), (field.columns - 1, i + 1)] {
-            within(&self.columns[cut], y0, y1).into_iter().for_each(|y| _ = mesh.insert((x, y)));
-        }
-        for (y, cut) in [(0, j), (field.rows - 1, j + 1)] {
-            within(&self.rows[cut], x0, x1).into_iter().for_each(|x| _ = mesh.insert((x, y)));
-        }
-        region.constrain(&mut mesh);
+        let Some(part) = self.frame.part(&self.tiling.field, tile) else { return Ok(None) };
+        let Part { first: [x0, y0], field, region, mut mesh, lines } = part;
+        let Placed { bent, outside } = mesh.constrain_lines(&lines);
         let spread = Spread { step: self.spread, first: [x0, y0] };
         for y in (1..field.rows - 1).filter(|&y| spread.has_row(y)) {
             for x in (1..field.columns - 1).filter(|&x| spread.has_column(x)) {
@@ -257,13 +211,14 @@ impl Level<'_> {
             better(&mut network, &field, rules, control).ok_or(TinError::Cancelled)?;
         }
         let columns = self.tiling.grid.columns();
+        let (x1, y1) = (x0 + field.columns as usize - 1, y0 + field.rows as usize - 1);
         let heights: Vec<f64> = (y0..=y1)
             .flat_map(|y| &self.tiling.grid.heights()[y * columns + x0..=y * columns + x1])
             .copied()
             .collect();
-        let errors = network.errors(&field, &heights);
+        let errors = network.errors(&field, &heights, false);
         let tin = network.into_tin(&field, [x0, y0].map(|c| c as u32));
         let (valid, isolated, grid_triangles) = (region.valid, region.isolated, region.triangles);
-        Ok(Some(Made { tin, errors, valid, isolated, grid_triangles, ..Made::default() }))
+        Ok(Some(Made { tin, errors, valid, isolated, grid_triangles, bent, outside, ..Made::default() }))
     }
 }

@@ -1,6 +1,7 @@
 //! Checks a network against a grid. Slow and plain on purpose: it shares no code with what makes networks, so that both would have to be
 //! wrong in the same way.
 
+use super::astray::{grid_triangle, near_outline, sides_astray};
 use super::{Contract, Tin};
 use crate::Grid;
 use std::collections::BTreeMap;
@@ -27,8 +28,15 @@ pub struct Verdict {
     pub turned: usize,
     /// Triangles without an area in the plan, or with a corner outside of the grid or of no vertex.
     pub flat: usize,
-    /// Twice the area of all triangles, less that of the valid region: 0 when they cover it once.
+    /// Twice the area of all triangles, less that of the valid region: 0 when they cover it once. 0 also where the outline was not to be exact.
     pub excess_area: i64,
+    /// Valid samples of the grid's valid triangles that nothing covers, near enough to the exact outline for a simplified one; else 0.
+    pub dropped: usize,
+    /// With a simplified outline, where areas cannot be compared: samples strictly within two triangles, and sides that two triangles have the same way
+    /// round; else 0.
+    pub overlapping: usize,
+    /// Sides of one triangle only that are farther from the exact outline than allowed; 0 if it was to be exact.
+    pub astray: usize,
     /// Whether heights, samples and error fit 128-bit integers together; otherwise f64 decided.
     pub exact: bool,
 }
@@ -37,8 +45,9 @@ impl Verdict {
     /// Whether nothing is wrong.
     #[must_use]
     pub fn is_good(&self) -> bool {
-        let wrong = [self.beyond, self.pieces_beyond, self.uncovered, self.over_void, self.turned, self.flat];
-        wrong == [0; 6] && self.excess_area == 0
+        let covers = [self.uncovered, self.over_void, self.overlapping, self.astray];
+        let wrong = [self.beyond, self.pieces_beyond, self.turned, self.flat];
+        covers == [0; 4] && wrong == [0; 4] && self.excess_area == 0
     }
 }
 
@@ -90,12 +99,24 @@ fn parts(v: f64) -> (u64, i32) {
 /// O(samples within the bounds of triangles), one thread.
 #[must_use]
 pub fn verify(grid: &Grid, tin: &Tin, error: f64, contract: Contract) -> Verdict {
+    check(grid, tin, error, contract, None)
+}
+
+/// The same for a network whose outline may lie up to `tolerance` samples from the exact one.
+///
+/// O(samples within the bounds of triangles + samples near the outline x tolerance^2), one thread.
+#[must_use]
+pub fn verify_outline(grid: &Grid, tin: &Tin, error: f64, tolerance: f64) -> Verdict {
+    check(grid, tin, error, Contract::Samples, Some(tolerance))
+}
+
+fn check(grid: &Grid, tin: &Tin, error: f64, contract: Contract, outline: Option<f64>) -> Verdict {
     let bound = if error.is_finite() { error } else { 0.0 };
     let all = grid.heights().iter().chain(&tin.heights).copied().chain([bound]);
     let fixed = Fixed::of(all);
     let mut verdict = Verdict { exact: fixed.is_some(), ..Verdict::default() };
     let (columns, rows) = (grid.columns() as i64, grid.rows() as i64);
-    // 1: covered, 2: beyond the error, 4: a void within a triangle.
+    // 1: covered, 2: beyond the error, 4: a void within a triangle, 8: strictly within one, 16: within two.
     let mut marks = vec![0u8; grid.heights().len()];
     let mut total = 0i64;
     for t in &tin.triangles {
@@ -129,8 +150,12 @@ pub fn verify(grid: &Grid, tin: &Tin, error: f64, contract: Contract) -> Verdict
                 }
                 let i = (y * columns + x) as usize;
                 let h = grid.heights()[i];
+                let strictly = u > 0 && v > 0 && w > 0;
+                if strictly {
+                    marks[i] |= if marks[i] & 8 != 0 { 16 } else { 8 };
+                }
                 if h.is_nan() {
-                    if u > 0 && v > 0 && w > 0 {
+                    if strictly {
                         marks[i] |= 4;
                     }
                     continue;
@@ -164,21 +189,30 @@ pub fn verify(grid: &Grid, tin: &Tin, error: f64, contract: Contract) -> Verdict
     let (mut expected, mut used) = (0, vec![false; marks.len()]);
     for y in 0..rows - 1 {
         for x in 0..columns - 1 {
-            let i = (y * columns + x) as usize;
-            let (right, up, both) = (i + 1, i + columns as usize, i + columns as usize + 1);
-            for grid_triangle in [[i, right, both], [i, both, up]] {
-                if grid_triangle.iter().all(|&s| !grid.heights()[s].is_nan()) {
+            for lower in [true, false] {
+                if let Some(triangle) = grid_triangle(grid, x, y, lower) {
                     expected += 1;
-                    grid_triangle.iter().for_each(|&s| used[s] = true);
+                    triangle.iter().for_each(|&[x, y]| used[(y * columns + x) as usize] = true);
                 }
             }
         }
     }
-    verdict.excess_area = total - expected;
+    if let Some(tolerance) = outline {
+        verdict.astray = sides_astray(grid, tin, tolerance, &mut verdict.overlapping);
+        verdict.overlapping += marks.iter().filter(|&m| m & 16 != 0).count();
+    } else {
+        verdict.excess_area = total - expected;
+    }
     for (i, &mark) in marks.iter().enumerate() {
         let valid = !grid.heights()[i].is_nan();
         verdict.isolated += usize::from(valid && !used[i]);
-        verdict.uncovered += usize::from(used[i] && mark & 1 == 0);
+        if used[i] && mark & 1 == 0 {
+            let at = [(i as i64 % columns) as f64, (i as i64 / columns) as f64];
+            match outline {
+                Some(tolerance) if near_outline(grid, at, tolerance) => verdict.dropped += 1,
+                _ => verdict.uncovered += 1,
+            }
+        }
         verdict.beyond += usize::from(mark & 2 != 0);
         verdict.over_void += usize::from(mark & 4 != 0);
     }
