@@ -27,10 +27,10 @@
 //! **Not guaranteed**: the tolerance. Errors of a hierarchy are found on rings as they were recorded, and here they are others. What is shown has fewer faces than by the other rules, and a larger error:
 //! `docs/selective.md` has both, measured. And as faces stand among others than they were made for, they can fold over.
 //!
-//! **The flip guard** ([`TrulyView::set_guard`], on at first) holds every step to what a recorded collapse is held to: no face around the vertex turns by more than 78 degrees or becomes a sliver that
-//! was none; and a face that a split makes turns its back neither on those around nor on the cone of normals below. A collapse that would is *deferred*: left undone until what is around it
+//! **The flip guard** ([`TrulyView::set_guard`], on at first) looks at every step. No face may turn away from where it looks at full detail (the normals of the vertices that its corners are there), unless
+//! it did before, or become a sliver that was none; nor may a split make one that looks away. A collapse that would is *deferred*: left undone until what is around it
 //! changes. A split that would is made *through its dependencies*: first all that it needs by the hierarchy's own rule, then it; and if even that turns a face, it is made all the same, as the tolerance asks for it,
-//! and counted ([`Guarded::turned`]). So under the guard no collapse turns a face, and splits do where they are counted. It looks at the mesh as it is, so with it the result depends on the frames before,
+//! and counted ([`Guarded::turned`]). So under the guard no collapse turns a face away, and splits do where they are counted. It looks at the mesh as it is, so with it the result depends on the frames before,
 //! and deferred collapses leave more faces. With infinite tolerance, or nothing to see, it rests, so the base comes back.
 
 mod adapt;
@@ -70,7 +70,7 @@ pub enum TrulyError {
 
 /// A mesh between base and full detail, finer where a view needs it, by the rule of the [module](self).
 ///
-/// Memory: about 100 B for every vertex shown, 24 B for every vertex of the finest mesh; and 44 B for each of those (with attributes about 50 B more), shared by all views ([`TrulyView::beside`]), on top
+/// Memory: about 100 B for every vertex shown, 24 B for every vertex of the finest mesh; and 47 B for each of those (with attributes about 50 B more), shared by all views ([`TrulyView::beside`]), on top
 /// of the hierarchy. [`TrulyView::bytes`] counts.
 #[derive(Clone, Debug)]
 pub struct TrulyView {

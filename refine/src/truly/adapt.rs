@@ -8,11 +8,11 @@ use std::collections::BinaryHeap;
 /// What the flip guard did in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Guarded {
-    /// Splits that are not needed and would turn or flatten a face if they were undone: they stay.
+    /// Splits that are not needed and would turn a face away or flatten one if they were undone: they stay.
     pub deferred: usize,
-    /// Splits made before others that would have turned or flattened a face, because those need them by the hierarchy's own rule.
+    /// Splits made before others that would have turned a face away or flattened one, because those need them by the hierarchy's own rule.
     pub through: usize,
-    /// Splits that turned or flattened a face even so.
+    /// Splits that did even so.
     pub turned: usize,
 }
 
@@ -174,7 +174,7 @@ impl TrulyView {
         if !self.find(j) {
             return;
         }
-        if guard && !guard::split_is_good(&self.mesh, &self.hierarchy, j, &self.gap) {
+        if guard && !guard::split_is_good(&self.mesh, &self.hierarchy, &self.pieces, j, &self.gap) {
             let recorded = self.recorded(j);
             let before = made.len();
             if self.face_count() + self.faces_of(&recorded) + 2 <= meter.limits.faces {
@@ -188,7 +188,9 @@ impl TrulyView {
             if !self.find(j) {
                 return;
             }
-            if made.len() == before || !guard::split_is_good(&self.mesh, &self.hierarchy, j, &self.gap) {
+            if made.len() == before
+                || !guard::split_is_good(&self.mesh, &self.hierarchy, &self.pieces, j, &self.gap)
+            {
                 self.guarded.turned += 1;
             }
         }

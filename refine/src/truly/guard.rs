@@ -1,64 +1,69 @@
-//! Whether a step turns or flattens faces.
+//! Whether a step turns faces away from where they look at full detail, or flattens them.
 
 use super::mesh::{Gap, Mesh};
 use super::pieces::Pieces;
 use crate::hierarchy::Hierarchy;
+use crate::progressive::Half;
 use glam::DVec3;
-use std::f64::consts::FRAC_PI_2;
 
-/// The cosine of the largest turn of a face in one step, 78 degrees, and the least of twice a face's area over its longest edge squared: what recorded collapses are held to
-/// (`progmesh_simplify`, which says on what they were decided), so that most pass among the faces they were recorded with.
-const MIN_TURN: f64 = 0.2;
+/// The least of twice a face's area over its longest edge squared: what recorded collapses are held to (`progmesh_simplify`, which says on what it was decided).
 const MIN_SHAPE: f64 = 1e-3;
 
-/// The triangle with its corner at `from`, opposite the side from `x` to `y`, neither turns nor becomes a sliver that it was not when that corner goes to `to`.
-fn stays_good(from: DVec3, to: DVec3, x: DVec3, y: DVec3) -> bool {
-    let side = y - x;
-    let (before, after) = (side.cross(from - x), side.cross(to - x));
-    let (b, a, turn) = (before.length_squared(), after.length_squared(), before.dot(after));
-    if b > 0.0 && (turn <= 0.0 || turn * turn < MIN_TURN * MIN_TURN * a * b) {
-        return false;
-    }
-    let sliver = |twice_squared: f64, p: DVec3| {
-        let longest = side.length_squared().max((p - x).length_squared()).max((p - y).length_squared());
-        twice_squared < MIN_SHAPE * MIN_SHAPE * longest * longest
-    };
-    !sliver(a, to) || sliver(b, from)
+/// A face around a vertex that moves.
+struct Moving {
+    /// Its other corners.
+    x: DVec3,
+    y: DVec3,
+    /// Where it looks at full detail, seen from `x` to `y`; 0 tells nothing.
+    reference: DVec3,
 }
 
-/// Split `i`, found at `gap`, turns and flattens no face, and its new faces turn their backs neither on those around nor on all that lies below. O(valence).
-pub(super) fn split_is_good(mesh: &Mesh, h: &Hierarchy, i: u32, gap: &Gap) -> bool {
+impl Moving {
+    fn of(mesh: &Mesh, h: &Hierarchy, pieces: &Pieces, e: Half) -> Moving {
+        let [x, y] = [mesh.far(e), mesh.far(e.turn())].map(|v| mesh.position(h, v));
+        let own = pieces.looks(mesh.face_in()[e.face as usize]);
+        Moving { x, y, reference: if e.starts { own } else { -own } }
+    }
+
+    /// It neither turns away nor becomes a sliver when its corner goes from one place to the other, or did before.
+    fn stays_good(&self, from: DVec3, to: DVec3) -> bool {
+        let &Moving { x, y, reference } = self;
+        let twice = |p: DVec3| (x - p).cross(y - p);
+        let (before, after) = (twice(from), twice(to));
+        let sliver = |twice: DVec3, p: DVec3| {
+            let longest = x.distance_squared(y).max(p.distance_squared(x)).max(p.distance_squared(y));
+            twice.length_squared() < MIN_SHAPE * MIN_SHAPE * longest * longest
+        };
+        (looks(after, reference) || !looks(before, reference)) && (!sliver(after, to) || sliver(before, from))
+    }
+}
+
+fn looks(normal: DVec3, reference: DVec3) -> bool {
+    reference == DVec3::ZERO || normal.dot(reference) > 0.0
+}
+
+/// Split `i`, found at `gap`, turns no face away and flattens none. O(valence).
+pub(super) fn split_is_good(mesh: &Mesh, h: &Hierarchy, pieces: &Pieces, i: u32, gap: &Gap) -> bool {
     let pm = h.mesh();
     let (vs, vu) = (pm.splits.vertex[i as usize], h.forest.base_vertices + i);
     let [old, new] = h.forest.nodes(i);
     let from = mesh.position(h, vs);
     let (t, u) = (h.forest.position(pm, old, vs), h.forest.position(pm, new, vu));
-    let at = |v: u32| mesh.position(h, v);
-    let mut sum = DVec3::ZERO;
-    for (k, &e) in gap.ring.iter().enumerate() {
-        let (x, y) = (at(mesh.far(e)), at(mesh.far(e.turn())));
+    let around = gap.ring.iter().enumerate().all(|(k, &e)| {
         let to = if gap.is_inner(k) { u } else { t };
-        if to != from && !stays_good(from, to, x, y) {
-            return false;
-        }
-        sum += (x - from).cross(y - from);
-    }
-    // In the sense of the ring: the face at the edge where what goes to the new vertex begins, and the one where it ends.
-    let [begin, end] = if gap.forward { gap.tips } else { [gap.tips[1], gap.tips[0]] };
-    let mut cone = None;
-    let mut faces_out = |normal: DVec3| {
-        if normal.dot(sum) > 0.0 {
-            return true;
-        }
-        let cone = *cone.get_or_insert_with(|| h.bounds(i as usize).cone);
-        cone.half_angle() < FRAC_PI_2 && normal.dot(cone.axis()) > 0.0 && sum.dot(cone.axis()) > 0.0
+        to == from || Moving::of(mesh, h, pieces, e).stays_good(from, to)
+    });
+    let code = pm.splits.code[i as usize];
+    let face = h.forest.first_face(i);
+    let made = |k: usize, (_, vu_next): (usize, bool)| {
+        let tip = mesh.position(h, gap.tips[k]);
+        let normal = (t - tip).cross(u - tip);
+        looks(if vu_next { -normal } else { normal }, pieces.looks(face + k as u32))
     };
-    let there = |v: u32| v != crate::aif::NONE;
-    (!there(begin) || faces_out((at(begin) - t).cross(u - t)))
-        && (!there(end) || faces_out((u - t).cross(at(end) - t)))
+    around && made(0, code.left()) && (!code.two_faces() || made(1, code.right()))
 }
 
-/// Undoing split `i`, which is applied, turns and flattens no face. O(valence).
+/// Undoing split `i`, which is applied, turns no face away and flattens none. O(valence).
 pub(super) fn collapse_is_good(mesh: &Mesh, h: &Hierarchy, pieces: &Pieces, i: u32) -> bool {
     let pm = h.mesh();
     let (vs, vu) = (pm.splits.vertex[i as usize], h.forest.base_vertices + i);
@@ -67,10 +72,7 @@ pub(super) fn collapse_is_good(mesh: &Mesh, h: &Hierarchy, pieces: &Pieces, i: u
     let mut good = true;
     mesh.around(h, i, |e, inner| {
         let from = if inner { u } else { t };
-        if good && from != to {
-            let [x, y] = [mesh.far(e), mesh.far(e.turn())].map(|v| mesh.position(h, v));
-            good = stays_good(from, to, x, y);
-        }
+        good = good && (from == to || Moving::of(mesh, h, pieces, e).stays_good(from, to));
     });
     good
 }
@@ -80,14 +82,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_turns_or_flattens_is_told_from_what_slides() {
-        let (x, y) = (DVec3::ZERO, DVec3::X);
+    fn what_turns_away_or_flattens_is_told_from_what_slides_or_comes_back() {
         let p = DVec3::new(0.5, 1.0, 0.0);
-        assert!(stays_good(p, DVec3::new(0.2, 0.5, 0.1), x, y));
-        assert!(!stays_good(p, DVec3::new(0.5, -1.0, 0.0), x, y), "turned over");
-        assert!(!stays_good(p, DVec3::new(0.5, 0.0, 1.0), x, y), "by 90 degrees");
-        assert!(!stays_good(p, DVec3::new(0.5, 1e-4, 0.0), x, y), "flattened");
-        assert!(stays_good(DVec3::new(0.5, 1e-4, 0.0), DVec3::new(0.5, 0.9e-4, 0.0), x, y), "flat before");
-        assert!(stays_good(DVec3::new(0.5, 0.0, 0.0), p, x, y), "no normal before");
+        let face = |reference| Moving { x: DVec3::ZERO, y: DVec3::X, reference };
+        let (out, back) = (face(DVec3::Z), face(-DVec3::Z));
+        assert!(out.stays_good(p, DVec3::new(0.2, 0.5, 0.1)));
+        assert!(!out.stays_good(p, DVec3::new(0.5, -1.0, 0.0)), "turned over");
+        assert!(back.stays_good(p, DVec3::new(0.5, -1.0, 0.0)), "turned back");
+        assert!(back.stays_good(p, DVec3::new(0.5, 2.0, 0.0)), "looks away as before");
+        assert!(!out.stays_good(p, DVec3::new(0.5, 1e-4, 0.0)), "flattened");
+        assert!(out.stays_good(DVec3::new(0.5, 1e-4, 0.0), DVec3::new(0.5, 0.9e-4, 0.0)), "flat before");
+        assert!(face(DVec3::ZERO).stays_good(p, DVec3::new(0.5, -1.0, 0.0)), "nothing is known");
     }
 }

@@ -36,8 +36,6 @@ pub(super) struct Gap {
     /// Those that go to the new vertex begin here, and are so many; in a ring that closes they may go past its end.
     start: usize,
     count: usize,
-    /// The new face of the left cut comes before them; else behind them.
-    pub(super) forward: bool,
     left: Opening,
     right: Opening,
     /// The other vertices of the edges that open: the left one's and, of a split that makes two faces, the right one's.
@@ -188,7 +186,6 @@ impl Mesh {
         };
         gap.start = start;
         gap.count = if closed { (end + m - start) % m } else { end - start };
-        gap.forward = forward;
         let some = gap.count > 0;
         let before = if start > 0 || closed { Some(ring[(start + m - 1) % m].turn()) } else { None };
         let behind = if end < m || closed { Some(ring[end % m]) } else { None };

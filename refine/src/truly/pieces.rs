@@ -2,12 +2,13 @@
 
 use super::TrulyError;
 use super::mesh::{Gap, Mesh};
-use crate::aif::NONE;
+use crate::aif::{NONE, Positions};
 use crate::hierarchy::{Forest, Hierarchy};
 use crate::progressive::{Cursor, Explicit, Half, ProgressiveMesh, SplitKind, link_faces};
+use glam::DVec3;
 use std::collections::HashMap;
 
-/// The static part of truly selective refinement: 44 B a vertex, with attributes about 50 B more.
+/// The static part of truly selective refinement: 47 B a vertex, with attributes about 50 B more.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pieces {
     /// The split that made the vertex of each split; [`NONE`] for vertices of the base.
@@ -24,6 +25,8 @@ pub(super) struct Pieces {
     apart: Vec<u32>,
     /// A face at every vertex of the base; [`NONE`] for none.
     around: Vec<u32>,
+    /// Normals of the vertices of the finest mesh, in that order, times 127.
+    normals: Vec<[i8; 3]>,
     /// For splits of vertices with several fans a face of the fan that they open; ascending.
     elsewhere: Vec<(u32, u32)>,
     pub(super) wedges: Option<WedgePieces>,
@@ -71,10 +74,24 @@ impl Pieces {
             around[v as usize] = f;
         }
         let leaves = corners.iter().map(|f| f.map(|v| order[v as usize])).collect();
+        let mut normals = vec![[0; 3]; order.len()];
+        for (v, n) in vertex_normals(&corners, full.positions()).into_iter().enumerate() {
+            normals[order[v] as usize] = (127.0 * n).round().to_array().map(|x| x as i8);
+        }
         let up = tree.parent.iter().map(|&k| forest.maker(k)).collect();
         let split_of = tree.split_of;
-        let mut pieces =
-            Pieces { up, split_of, order, ends, leaves, apart, around, elsewhere: Vec::new(), wedges };
+        let mut pieces = Pieces {
+            up,
+            split_of,
+            order,
+            ends,
+            leaves,
+            apart,
+            around,
+            normals,
+            elsewhere: Vec::new(),
+            wedges,
+        };
         pieces.go_through(h, &base)?;
         Ok(pieces)
     }
@@ -132,6 +149,13 @@ impl Pieces {
         self.leaves[f as usize][k]
     }
 
+    /// Where face `f` looks at full detail: the sum of its vertices' normals there, of any length. 0 if that tells nothing.
+    #[inline]
+    pub(super) fn looks(&self, f: u32) -> DVec3 {
+        let of = |leaf: u32| DVec3::from_array(self.normals[leaf as usize].map(f64::from));
+        self.leaves[f as usize].into_iter().map(of).sum()
+    }
+
     /// The split that parts the cut vertices of split `i`; [`NONE`] for none.
     #[inline]
     pub(super) fn apart(&self, i: u32) -> u32 {
@@ -180,8 +204,23 @@ impl Pieces {
             .wedges
             .as_ref()
             .map_or(0, |w| 12 * w.corners.len() + 8 * (w.from.len() + w.brought.len()) + 4 * w.row.len());
-        4 * (tree + numbers) + 12 * self.leaves.len() + 8 * self.elsewhere.len() + wedges
+        4 * (tree + numbers)
+            + 3 * self.normals.len()
+            + 12 * self.leaves.len()
+            + 8 * self.elsewhere.len()
+            + wedges
     }
+}
+
+/// Of unit length, or 0.
+fn vertex_normals(faces: &[[u32; 3]], positions: &Positions) -> Vec<DVec3> {
+    let mut sums = vec![DVec3::ZERO; positions.len()];
+    for f in faces {
+        let p = f.map(|v| positions.get(v as usize));
+        let normal = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
+        f.iter().for_each(|&v| sums[v as usize] += normal);
+    }
+    sums.iter().map(|n| n.normalize_or_zero()).collect()
 }
 
 /// The vertices of the base's faces.
