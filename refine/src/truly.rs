@@ -29,8 +29,8 @@
 //!
 //! **The flip guard** ([`TrulyView::set_guard`], on at first) looks at every step. No face may turn away from where it looks at full detail (the normals of the vertices that its corners are there), unless
 //! it did before, or become a sliver that was none; nor may a split make one that looks away. A collapse that would is *deferred*: left undone until what is around it
-//! changes. A split that would is made *through its dependencies*: first all that it needs by the hierarchy's own rule, then it; and if even that turns a face, it is made all the same, as the tolerance asks for it,
-//! and counted ([`Guarded::turned`]). So under the guard no collapse turns a face away, and splits do where they are counted. It looks at the mesh as it is, so with it the result depends on the frames before,
+//! changes. A split that would is made *through its dependencies*: first all that it needs by the hierarchy's own rule, then it; and if even that turns a face, its corners are split until it has turned back: at full detail no face looks away. The last resort is that it stays so
+//! and is counted ([`Guarded::turned`]): after 32 attempts, or for a limit of faces. So under the guard no collapse turns a face away, and splits do where they are counted. It looks at the mesh as it is, so with it the result depends on the frames before,
 //! and deferred collapses leave more faces. With infinite tolerance, or nothing to see, it rests, so the base comes back.
 
 mod adapt;

@@ -335,6 +335,11 @@ fn the_guard_keeps_faces_from_folding_over() {
         (deferred, through, turned) = (deferred + g.deferred, through + g.through, turned + g.turned);
         assert_eq!(free.guarded(), Default::default());
     }
+    eprintln!(
+        "{deferred} {through} {turned} {counts:?} faces {} {}",
+        guarded.face_count(),
+        free.face_count()
+    );
     assert!(deferred > 0 && through > 0, "{deferred} {through} {turned}");
     assert!(counts[0] * 2 < counts[1], "{counts:?}, {turned} turned");
     // Nothing to see: the base, whatever that turns.

@@ -10,11 +10,14 @@ use std::collections::BinaryHeap;
 pub struct Guarded {
     /// Splits that are not needed and would turn a face away or flatten one if they were undone: they stay.
     pub deferred: usize,
-    /// Splits made before others that would have turned a face away or flattened one, because those need them by the hierarchy's own rule.
+    /// Splits made with others that would have turned a face away or flattened one: those that the others need by the hierarchy's own rule, before them, and those that turn faces back, behind them.
     pub through: usize,
-    /// Splits that did even so.
+    /// Splits that turned a face away even so, or flattened one, and it could not be turned back.
     pub turned: usize,
 }
+
+/// Attempts to turn back what a split turned.
+const TURNS: usize = 32;
 
 /// What is left of the limits.
 struct Meter<'a> {
@@ -168,35 +171,86 @@ impl TrulyView {
         true
     }
 
-    /// Applies split `j`, whose needs are applied; if it would turn a face, first what it needs by the hierarchy's own rule.
+    /// Applies split `j`, whose needs are applied; if it would turn a face, first what it needs by the hierarchy's own rule, then what turns it back.
     fn apply_guarded(&mut self, j: u32, guard: bool, meter: &Meter<'_>, made: &mut Vec<u32>) {
         // Another split of the closure may have been made through it.
         if !self.find(j) {
             return;
         }
-        if guard && !guard::split_is_good(&self.mesh, &self.hierarchy, &self.pieces, j, &self.gap) {
-            let recorded = self.recorded(j);
-            let before = made.len();
-            if self.face_count() + self.faces_of(&recorded) + 2 <= meter.limits.faces {
-                for d in recorded {
-                    if self.find(d) && self.apply(d) {
-                        made.push(d);
-                    }
+        let before = made.len();
+        let good = |v: &Self| guard::split_is_good(&v.mesh, &v.hierarchy, &v.pieces, j, &v.gap);
+        if !guard || good(self) {
+            if self.apply(j) {
+                made.push(j);
+            }
+            return;
+        }
+        let recorded = self.recorded(j);
+        if self.face_count() + self.faces_of(&recorded) + 2 <= meter.limits.faces {
+            for d in recorded {
+                if self.find(d) && self.apply(d) {
+                    made.push(d);
                 }
             }
-            self.guarded.through += made.len() - before;
-            if !self.find(j) {
-                return;
-            }
-            if made.len() == before
-                || !guard::split_is_good(&self.mesh, &self.hierarchy, &self.pieces, j, &self.gap)
-            {
-                self.guarded.turned += 1;
-            }
         }
-        if self.apply(j) {
-            made.push(j);
+        self.guarded.through += made.len() - before;
+        if !self.find(j) {
+            return;
         }
+        let good = made.len() > before && good(self);
+        let mut faces = Vec::new();
+        self.apply_noting(j, &mut faces);
+        made.push(j);
+        if !good {
+            self.guarded.turned += usize::from(!self.turn_back(&mut faces, meter, made));
+        }
+    }
+
+    /// Applies split `i`, which has just been found, and notes the faces around it.
+    fn apply_noting(&mut self, i: u32, faces: &mut Vec<u32>) {
+        faces.extend(self.gap.ring.iter().map(|e| self.mesh.face_in()[e.face as usize]));
+        let first = self.hierarchy.forest.first_face(i);
+        let two = self.hierarchy.mesh().splits.code[i as usize].two_faces();
+        faces.extend(first..=first + u32::from(two));
+        self.apply(i);
+    }
+
+    /// Splits corners of those of the faces that look away, the coarsest first, until none does; false if one is left.
+    fn turn_back(&mut self, faces: &mut Vec<u32>, meter: &Meter<'_>, made: &mut Vec<u32>) -> bool {
+        let mut all = Vec::new();
+        for _ in 0..TURNS {
+            let away = faces
+                .iter()
+                .copied()
+                .filter(|&f| guard::looks_away(&self.mesh, &self.hierarchy, &self.pieces, f));
+            let next =
+                away.map(|f| self.coarsest_corner(f)).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+            let Some((_, next)) = next else { return true };
+            if next == NONE {
+                return false;
+            }
+            self.closure(next, &mut all);
+            if self.face_count() + self.faces_of(&all) > meter.limits.faces {
+                return false;
+            }
+            for &d in &all {
+                if self.find(d) {
+                    self.apply_noting(d, faces);
+                    made.push(d);
+                    self.guarded.through += 1;
+                }
+            }
+            faces.sort_unstable();
+            faces.dedup();
+        }
+        false
+    }
+
+    /// Of the splits of a face's corners the one with the largest error, and that; [`NONE`] if all are as at full detail.
+    fn coarsest_corner(&self, f: u32) -> (f64, u32) {
+        let splits = self.mesh.corners_of(f).map(|v| self.pieces.split_of(self.mesh.node(v)));
+        let error = |s: u32| if s == NONE { -1.0 } else { self.hierarchy.all_bounds().error(s as usize) };
+        splits.map(|s| (error(s), s)).into_iter().fold((-2.0, NONE), |a, b| if b.0 > a.0 { b } else { a })
     }
 
     /// All that split `j` needs by the hierarchy's own rule and is not applied, ascending; not itself.

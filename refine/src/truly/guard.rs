@@ -63,6 +63,12 @@ pub(super) fn split_is_good(mesh: &Mesh, h: &Hierarchy, pieces: &Pieces, i: u32,
     around && made(0, code.left()) && (!code.two_faces() || made(1, code.right()))
 }
 
+/// Face `f`, which is in the mesh, turns away from where it looks at full detail.
+pub(super) fn looks_away(mesh: &Mesh, h: &Hierarchy, pieces: &Pieces, f: u32) -> bool {
+    let [a, b, c] = mesh.corners_of(f).map(|v| mesh.position(h, v));
+    !looks((b - a).cross(c - a), pieces.looks(f))
+}
+
 /// Undoing split `i`, which is applied, turns no face away and flattens none. O(valence).
 pub(super) fn collapse_is_good(mesh: &Mesh, h: &Hierarchy, pieces: &Pieces, i: u32) -> bool {
     let pm = h.mesh();

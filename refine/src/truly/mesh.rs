@@ -92,6 +92,11 @@ impl Mesh {
         &self.fans.corners
     }
 
+    /// The vertices of face `f`, which is in the mesh.
+    pub(super) fn corners_of(&self, f: u32) -> [u32; 3] {
+        self.fans.corners[self.slot_of[f as usize] as usize]
+    }
+
     pub(super) fn face_in(&self) -> &[u32] {
         &self.face_in
     }
