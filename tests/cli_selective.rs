@@ -224,7 +224,7 @@ fn the_weakest_rule_shows_the_fewest_faces() {
         assert_eq!(p.info("out.ply")["triangles"]["file"], r["faces"], "{flags}");
         let shape = &p.info("out.ply")["meshes"][0];
         let kept = ["manifold", "components", "euler", "border_loops"].map(|k| shape[k].clone());
-        assert_eq!(kept, [true.into(), 1.into(), (-4).into(), 6.into()], "{flags}");
+        assert_eq!(Value::from(kept.to_vec()), serde_json::json!([true, 1, -4, 6]), "{flags}");
         (r["faces"].as_u64().unwrap(), r)
     };
     assert_eq!(extract("--tau 0 --cull none --rule truly").1["guard"]["deferred"], 0);
@@ -235,7 +235,7 @@ fn the_weakest_rule_shows_the_fewest_faces() {
     assert_eq!(rings.0, extract("--tau 0.5").0);
     let (guarded, free) = (extract("--tau 0.5 --rule truly"), extract("--tau 0.5 --rule truly --no-guard"));
     assert!(free.0 <= guarded.0 && guarded.0 < rings.0, "{} {} {}", free.0, guarded.0, rings.0);
-    assert_eq!((&free.1["guard"]["through"], &free.1["guard"]["turned"]), (&0.into(), &0.into()));
+    assert!(free.1["guard"]["through"] == 0 && free.1["guard"]["turned"] == 0);
     let budget = extract("--tau 0.1 --budget-faces 900 --rule truly --strips").0;
     assert!((600..=900).contains(&budget), "{budget}");
     let run = p.done("fly in.pm --path circle --frames 4 --rule truly --png-every 3 --png-to shots");
