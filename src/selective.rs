@@ -9,6 +9,8 @@ mod player;
 mod record;
 mod shot;
 mod terrain;
+mod tolerance;
+mod truly;
 
 pub use flight::{FlightPath, FrameSpace, PathError, circle, lemniscate, recorded};
 pub use heights::GroundJudgement;
@@ -19,6 +21,7 @@ pub use player::player_page;
 pub use record::{FrameCounts, RecordError, Recorder, Recording, upward};
 pub use shot::{ShotStyle, shot};
 pub use terrain::{Ground, Lap};
+pub use truly::{TrulyScene, TrulySceneError};
 
 use crate::progressive::{Leftover, ProgressiveScene};
 use crate::refine::hierarchy::{Hierarchy, Options};
@@ -62,9 +65,6 @@ pub enum SelectiveError {
         source: LensError,
     },
 }
-
-/// Halvings of the interval of tolerances in [`SelectiveScene::extract`]: to a millionth.
-const HALVINGS: u32 = 24;
 
 /// Where each of so many meshes stands; without nodes where its coordinates say.
 fn places_of(shell: &Scene, meshes: usize) -> Vec<Vec<DMat4>> {
@@ -230,27 +230,10 @@ impl SelectiveScene {
         faces: Option<usize>,
     ) -> Result<f64, SelectiveError> {
         let most = faces.unwrap_or(usize::MAX);
-        let no_limits = Limits::default();
-        self.adapt(camera, tau, cull, &no_limits)?;
-        if self.face_count() <= most {
-            return Ok(tau);
-        }
-        let (mut low, mut high) = (tau, tau.max(1e-3));
-        loop {
-            high *= 2.0;
-            self.adapt(camera, high, cull, &no_limits)?;
-            if self.face_count() <= most || high.is_infinite() {
-                break;
-            }
-            low = high;
-        }
-        for _ in 0..if high.is_finite() { HALVINGS } else { 0 } {
-            let middle = 0.5 * (low + high);
-            self.adapt(camera, middle, cull, &no_limits)?;
-            *if self.face_count() <= most { &mut high } else { &mut low } = middle;
-        }
-        self.adapt(camera, high, cull, &no_limits)?;
-        Ok(high)
+        tolerance::least(tau, |tau| {
+            self.adapt(camera, tau, cull, &Limits::default())?;
+            Ok(self.face_count() <= most)
+        })
     }
 
     /// What changed in the buffers of each mesh since this was last called.

@@ -86,6 +86,11 @@ fn wrong_cameras_and_paths_are_named() {
         ("fly in.ply --path circle --hysteresis 0", 2, "0.1 to 1"),
         ("fly in.ply --path circle --geomorph=time:0", 2, "time:FRAMES"),
         ("fly in.ply --path circle --geomorph=error:1", 2, "error:BAND"),
+        ("fly in.ply --path circle --rule truly --geomorph", 2, "--geomorph"),
+        ("fly in.ply --path circle --rule truly --html a.html", 2, "--html"),
+        ("fly in.ply --path circle --rule truly --memory 64", 2, "--memory"),
+        ("extract in.ply out.ply --camera cam.json --rule rings --no-guard", 2, "--rule truly"),
+        ("extract in.ply out.ply --camera cam.json --no-guard", 2, "--rule"),
     ] {
         let run = p.run(arguments);
         assert_eq!(run.code, code, "{arguments}: {}", run.stderr);
@@ -205,6 +210,36 @@ fn with_a_limit_of_memory_the_same_is_shown_of_fewer_bytes() {
     let slow = p.done(&format!("{flight} --memory 64 --fetches 1")).json();
     assert!(slow["frames"].as_array().unwrap().iter().all(|f| number(f, "fetched") <= 1));
     assert!(number(&slow["frames"][0], "faces") < number(&paged["frames"][0], "faces"));
+}
+
+/// Truly selective: the ends are those of the other rules, between them there are fewer faces; a budget is kept, pictures are drawn.
+#[test]
+fn the_weakest_rule_shows_the_fewest_faces() {
+    let p = place();
+    p.generate("scan", "in.ply", 6_000);
+    p.done("encode in.ply in.pm --bounds -q");
+    p.done("convert in.ply same.ply -q");
+    let extract = |flags: &str| {
+        let r = p.done(&format!("extract in.pm out.ply --camera cam.json --json -q {flags}")).json();
+        assert_eq!(p.info("out.ply")["triangles"]["file"], r["faces"], "{flags}");
+        let shape = &p.info("out.ply")["meshes"][0];
+        let kept = ["manifold", "components", "euler", "border_loops"].map(|k| shape[k].clone());
+        assert_eq!(Value::from(kept.to_vec()), serde_json::json!([true, 1, -4, 6]), "{flags}");
+        (r["faces"].as_u64().unwrap(), r)
+    };
+    assert_eq!(extract("--tau 0 --cull none --rule truly").1["guard"]["deferred"], 0);
+    assert!(p.read("out.ply") == p.read("same.ply"));
+    assert_eq!(extract("--tau inf --rule truly").0, extract("--tau inf").0);
+    let (rings, cuts) = (extract("--tau 0.5 --rule rings"), extract("--tau 0.5 --rule cuts"));
+    assert_eq!((rings.1["rule"].as_str(), cuts.1["rule"].as_str()), (Some("rings"), Some("cuts")));
+    assert_eq!(rings.0, extract("--tau 0.5").0);
+    let (guarded, free) = (extract("--tau 0.5 --rule truly"), extract("--tau 0.5 --rule truly --no-guard"));
+    assert!(free.0 <= guarded.0 && guarded.0 < rings.0, "{} {} {}", free.0, guarded.0, rings.0);
+    assert!(free.1["guard"]["through"] == 0 && free.1["guard"]["turned"] == 0);
+    let budget = extract("--tau 0.1 --budget-faces 900 --rule truly --strips").0;
+    assert!((600..=900).contains(&budget), "{budget}");
+    let run = p.done("fly in.pm --path circle --frames 4 --rule truly --png-every 3 --png-to shots");
+    assert!(run.stderr.contains("flip guard") && p.exists("shots/frame00003.png"), "{}", run.stderr);
 }
 
 #[test]

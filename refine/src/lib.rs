@@ -10,7 +10,7 @@
 //!
 //! There now: the multiresolution scheme in memory, [progressive meshes](progressive), their [files and
 //! streams](mod@format), [geomorphs](geomorph), [views](view): cameras, their planes, what they cannot see; and [view-dependent
-//! refinement](selective) over a [hierarchy].
+//! refinement](selective) over a [hierarchy], [truly selective](truly) as an option.
 //!
 //! ```
 //! use progmesh_refine::{History, simplify::{Options, Quiet}};
@@ -31,6 +31,7 @@ pub mod progressive;
 mod record;
 pub mod selective;
 mod strips;
+pub mod truly;
 pub mod view;
 
 pub use geomorph::{Geomorph, GeomorphError};
@@ -40,3 +41,4 @@ pub use progmesh_simplify as simplify;
 pub use progressive::{Cursor, ProgressiveMesh};
 pub use record::{History, HistoryLevel};
 pub use strips::Strips;
+pub use truly::TrulyView;

@@ -1,6 +1,7 @@
 //! `progmesh extract IN OUT --camera CAM`.
 
 mod paged;
+mod refined;
 
 use super::args::{self, Input};
 use super::common::{self, Warnings, short, thousands};
@@ -8,12 +9,12 @@ use super::control::{Interrupt, Progress};
 use super::ending::Ending;
 use super::method::Making;
 use super::paging::Paging;
+use super::rule::{Guard, RuleArgs};
 use super::{Failure, camera};
 use clap::ValueEnum;
 use progmesh::pipeline::build_progressive;
 use progmesh::progressive::ProgressiveScene;
 use progmesh::refine::Strips;
-use progmesh::refine::hierarchy;
 use progmesh::refine::selective::Cull;
 use progmesh::report::View;
 use progmesh::selective::SelectiveScene;
@@ -24,7 +25,7 @@ use std::time::Instant;
 /// Write a mesh as fine as one view needs it: parts that are far, out of sight or turned away are left coarse.
 ///
 /// Of a mesh a progressive mesh is made first; a .pm is refined as it is. Where the camera sees the surface from its front, what is written
-/// deviates from the input by no more than --tau pixels. That is proven at samples of the input, with a margin for what lies between.
+/// deviates from the input by no more than --tau pixels. That is proven at samples of the input, with a margin for what lies between; not by --rule truly.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "\
 Examples:
@@ -32,6 +33,7 @@ Examples:
   progmesh extract scene.pm view.glb --camera scene.glb#door --budget-faces 20000
   progmesh extract city.pm street.glb --camera cam.json --memory 256
   progmesh extract scan.ply out.glb --camera cam.json --strips
+  progmesh extract scan.ply out.glb --camera cam.json --rule truly
   progmesh extract scan.ply out.obj --camera cam.json --cull none --png out.png --wireframe
 
 Exit code 1 means: done and written, but the base has more faces than --budget-faces.")]
@@ -68,6 +70,8 @@ pub(crate) struct Needs {
     /// Read of a .pm only what is needed, and hold at most so many MiB of it: for files of any size, made by encode --paged
     #[arg(long, value_name = "MIB", value_parser = args::positive, allow_negative_numbers = true, help_heading = "View")]
     pub(crate) memory: Option<usize>,
+    #[command(flatten)]
+    pub(crate) rule: RuleArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -114,6 +118,7 @@ pub(crate) struct Made {
 pub(crate) fn make(
     input: &Input,
     making: &Making,
+    rule: &RuleArgs,
     quiet: bool,
     interrupt: &Interrupt,
     warnings: &mut Warnings,
@@ -122,7 +127,7 @@ pub(crate) fn make(
     let job = making.job()?;
     let file = input.name();
     let failed = |e: &dyn std::fmt::Display| Failure::Input(format!("{file}: {e}"));
-    let read: ProgressiveScene = input.read_or_make(warnings, |scene, warnings| {
+    let mut read: ProgressiveScene = input.read_or_make(warnings, |scene, warnings| {
         interrupt.be_graceful();
         let progress = Progress::new(interrupt, quiet, "simplifying");
         let built = build_progressive(scene, &job, &progress).map_err(|e| failed(&e))?;
@@ -134,7 +139,8 @@ pub(crate) fn make(
     })?;
     interrupt.be_graceful();
     let (read_seconds, start) = (start.elapsed().as_secs_f64(), Instant::now());
-    let scene = SelectiveScene::new(read, &hierarchy::Options::default()).map_err(|e| failed(&e))?;
+    let options = rule.options(&mut read);
+    let scene = SelectiveScene::new(read, &options).map_err(|e| failed(&e))?;
     if interrupt.is_set() {
         return Err(Failure::Interrupted);
     }
@@ -144,6 +150,7 @@ pub(crate) fn make(
 impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
+        self.needs.rule.check(self.needs.memory.is_some())?;
         let mut results = self.ending.begin()?;
         let camera = camera::read(&self.camera, &mut results.warnings)?;
         results.through(View::of_camera(&camera));
@@ -153,26 +160,29 @@ impl Args {
         let file = self.input.name();
         let interrupt = Interrupt::watch();
         let (report, full) = common::in_pool(self.making.collapsing.threads, || {
-            let mut made =
-                make(&self.input, &self.making, self.ending.quiet, &interrupt, &mut results.warnings)?;
+            let rule = &self.needs.rule;
+            let made =
+                make(&self.input, &self.making, rule, self.ending.quiet, &interrupt, &mut results.warnings)?;
+            let (full_faces, full_splits) =
+                (made.scene.full_faces(), made.scene.views().iter().map(|v| v.hierarchy().splits()).sum());
             let refining = Instant::now();
-            let most = self.needs.budget_faces;
-            let tau = made.scene.extract(&camera, self.needs.tau, self.needs.cull(), most);
-            let tau = tau.map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+            let name = rule.name(&made.scene);
+            let done = self.refine(made.scene, &camera)?;
             let refine = refining.elapsed().as_secs_f64();
-            let spent = self.ending.finish(&mut results, &made.scene.to_scene(), &interrupt)?;
-            let splits = made.scene.views().iter().map(|v| v.applied().count()).sum();
+            let spent = self.ending.finish(&mut results, &done.scene(), &interrupt)?;
             let report = Report {
                 command: "extract",
                 to: results.format.extension(),
-                tau: tau.is_finite().then_some(tau),
-                faces: made.scene.face_count(),
-                vertices: made.scene.vertex_count(),
-                splits,
-                full_faces: made.scene.full_faces(),
-                full_splits: made.scene.views().iter().map(|v| v.hierarchy().splits()).sum(),
-                visible_vertices: made.scene.visible_vertices(&camera),
-                strips: self.strips.then(|| StripReport::of(made.scene.views().iter().map(|v| v.strips()))),
+                rule: name,
+                tau: done.tau.is_finite().then_some(done.tau),
+                faces: done.faces(),
+                vertices: done.vertices(),
+                splits: done.splits(),
+                full_faces,
+                full_splits,
+                visible_vertices: done.visible_vertices(&camera),
+                strips: self.strips.then(|| done.strips()),
+                guard: done.guard(),
                 paging: None,
                 seconds: Seconds {
                     read: made.read,
@@ -183,13 +193,13 @@ impl Args {
                 },
                 warnings: vec![],
             };
-            Ok((report, made.scene.full_faces()))
+            Ok((report, full_faces))
         })?;
         let report = Report { warnings: results.warnings.all, ..report };
         self.ending.say(|| {
             let at = report.tau.map_or("inf".into(), short);
             format!(
-                "{file}: {} of {} faces at {at} pixels; {:.3} s (read {:.3}, bounds {:.3}, refine {:.3}, write {:.3}){}",
+                "{file}: {} of {} faces at {at} pixels; {:.3} s (read {:.3}, bounds {:.3}, refine {:.3}, write {:.3}){}{}",
                 thousands(report.faces),
                 thousands(full),
                 report.seconds.total,
@@ -197,7 +207,8 @@ impl Args {
                 report.seconds.bounds,
                 report.seconds.refine,
                 report.seconds.write,
-                StripReport::text(report.strips)
+                StripReport::text(report.strips),
+                report.guard.map_or(String::new(), |g| format!("; {}", g.text()))
             )
         });
         self.ending.print(&report)?;
@@ -222,6 +233,7 @@ impl Args {
 struct Report {
     command: &'static str,
     to: &'static str,
+    rule: &'static str,
     tau: Option<f64>,
     faces: usize,
     vertices: usize,
@@ -231,6 +243,7 @@ struct Report {
     visible_vertices: usize,
     strips: Option<StripReport>,
     paging: Option<Paging>,
+    guard: Option<Guard>,
     seconds: Seconds,
     warnings: Vec<String>,
 }

@@ -7,6 +7,7 @@ mod path;
 mod play;
 mod report;
 mod shots;
+mod truly;
 
 use super::Failure;
 use super::args::{self, Input};
@@ -38,6 +39,7 @@ Examples:
   progmesh fly dragon.ply --path circle --html dragon.html --html-taus 1,4
   progmesh fly alps.pm --path lemniscate --grid alps.tif --path-speed fast --measure-every 10
   progmesh fly city.pm --path walk.json --memory 256 --fetches 2
+  progmesh fly dragon.ply --path circle --rule truly --measure-every 20
   progmesh fly terrain.obj --path canyon.frames --path-scale 1024 --budget-us 500
 
 Exit code 1 means: done, but the measured error came above --tau in a frame that had come to rest, with no vertex on the way.")]
@@ -100,6 +102,8 @@ impl Args {
         let file = self.input.name();
         // Before any work is done.
         let source = self.path.open(&mut warnings)?;
+        self.needs.rule.check(self.needs.memory.is_some())?;
+        self.check_truly()?;
         self.shots.check()?;
         self.play.check()?;
         let interrupt = Interrupt::watch();
@@ -107,22 +111,30 @@ impl Args {
             if let Some(mib) = self.needs.memory {
                 return self.run_paged(mib, &source, &interrupt);
             }
-            let made = extract::make(&self.input, &self.making, self.quiet, &interrupt, &mut warnings)?;
+            let rule = &self.needs.rule;
+            let made = extract::make(&self.input, &self.making, rule, self.quiet, &interrupt, &mut warnings)?;
             let (seconds, mut scene) = ([made.read, made.bounds], made.scene);
             let course = self.path.lay(&source, scene.bounds(), &file)?;
-            scene.set_geomorph(self.geomorph);
-            let report = self.fly(&mut scene, &course, &interrupt)?;
-            let [shared, shown, tables] = report.1;
-            let vertices = scene.full_vertices();
+            let (name, vertices, full_faces) = (rule.name(&scene), scene.full_vertices(), scene.full_faces());
+            let (frames, [shared, shown, tables], guard) = if rule.is_truly() {
+                let (frames, bytes, guard) = self.fly_truly(scene, &course, &interrupt)?;
+                (frames, bytes, Some(guard))
+            } else {
+                scene.set_geomorph(self.geomorph);
+                let (frames, bytes) = self.fly(&mut scene, &course, &interrupt)?;
+                (frames, bytes, None)
+            };
             let memory = Memory {
                 shared_bytes: shared,
                 shared_bytes_per_vertex: shared as f64 / vertices.max(1) as f64,
                 view_bytes: shown,
                 view_table_bytes: tables,
-                most_vertices: report.0.iter().map(|f| f.vertices).max().unwrap_or(0),
+                most_vertices: frames.iter().map(|f| f.vertices).max().unwrap_or(0),
             };
             let path = self.path.name().to_string();
-            Ok(Report::new(path, self.needs.tau, scene.full_faces(), report.0, memory, seconds))
+            let mut report = Report::new(path, self.needs.tau, full_faces, frames, memory, seconds);
+            (report.rule, report.guard) = (name, guard);
+            Ok(report)
         })?;
         warnings.say(std::mem::take(&mut report.warnings));
         report.warnings = warnings.all;

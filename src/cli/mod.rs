@@ -28,6 +28,7 @@ mod morph;
 mod paging;
 mod picture;
 mod problems;
+mod rule;
 mod simplify;
 mod terrain;
 

@@ -63,7 +63,17 @@ impl Judge {
     ///
     /// Errors: nothing is shown, or positions that no distances can be computed of.
     pub fn measure(&self, scene: &SelectiveScene, camera: &Camera) -> Result<Judgement, MeasureError> {
-        let triangles = scene.triangles();
+        self.measure_triangles(&scene.triangles(), camera)
+    }
+
+    /// The same of triangles in the world that are shown.
+    ///
+    /// Errors: as [`Judge::measure`].
+    pub fn measure_triangles(
+        &self,
+        triangles: &[[DVec3; 3]],
+        camera: &Camera,
+    ) -> Result<Judgement, MeasureError> {
         let points: Vec<[f64; 3]> = triangles.as_flattened().iter().map(|p| p.to_array()).collect();
         let indices: Vec<[u32; 3]> =
             (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();

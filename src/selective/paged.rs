@@ -1,6 +1,6 @@
 //! A scene refined where a camera needs it, of which only what is needed is read.
 
-use super::{HALVINGS, places_of};
+use super::{places_of, tolerance};
 use crate::aif::NONE;
 use crate::io::DecodeError;
 use crate::io::grid::ReadAt;
@@ -261,27 +261,10 @@ impl PagedScene {
     ) -> Result<f64, PagedSceneError> {
         let most = faces.unwrap_or(usize::MAX);
         let limits = PagedLimits::default();
-        let mut fits = |tau: f64| -> Result<bool, PagedSceneError> {
+        tolerance::least(tau, |tau| {
             let done = self.adapt(camera, tau, cull, &limits)?;
             Ok(self.face_count() <= most && done.done.complete)
-        };
-        if fits(tau)? {
-            return Ok(tau);
-        }
-        let (mut low, mut high) = (tau, tau.max(1e-3));
-        loop {
-            high *= 2.0;
-            if fits(high)? || high.is_infinite() {
-                break;
-            }
-            low = high;
-        }
-        for _ in 0..if high.is_finite() { HALVINGS } else { 0 } {
-            let middle = 0.5 * (low + high);
-            *if fits(middle)? { &mut high } else { &mut low } = middle;
-        }
-        fits(high)?;
-        Ok(high)
+        })
     }
 
     /// Bytes of the index buffers, and entries of the vertex buffers, that changed since this was last called.

@@ -9,6 +9,7 @@ use serde::Deserialize;
 struct Extract {
     command: String,
     to: String,
+    rule: String,
     #[serde(deserialize_with = "present")]
     tau: Option<f64>,
     faces: usize,
@@ -21,6 +22,8 @@ struct Extract {
     strips: Option<ExtractStrips>,
     #[serde(deserialize_with = "present")]
     paging: Option<Paging>,
+    #[serde(deserialize_with = "present")]
+    guard: Option<Guard>,
     seconds: ExtractSeconds,
     warnings: Vec<String>,
 }
@@ -49,6 +52,14 @@ struct Paging {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct Guard {
+    deferred: usize,
+    through: usize,
+    turned: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct ExtractSeconds {
     read: f64,
     bounds: f64,
@@ -62,6 +73,7 @@ struct ExtractSeconds {
 struct Fly {
     command: String,
     path: String,
+    rule: String,
     #[serde(deserialize_with = "present")]
     tau: Option<f64>,
     full_faces: usize,
@@ -86,6 +98,8 @@ struct Fly {
     memory: FlyMemory,
     #[serde(deserialize_with = "present")]
     paging: Option<Paging>,
+    #[serde(deserialize_with = "present")]
+    guard: Option<Guard>,
     frames: Vec<FlyFrame>,
     seconds: FlySeconds,
     warnings: Vec<String>,
@@ -207,6 +221,17 @@ fn selective_commands_print_one_object_with_the_documented_fields() {
         strips.mean_length > 2.0 && (strips.mean_length * strips.count as f64 - s.faces as f64).abs() < 1e-6
     );
     assert!(e.paging.is_none() && f.paging.is_none() && f.frames[0].fetched.is_none());
+    assert_eq!((e.rule.as_str(), f.rule.as_str()), ("rings", "rings"));
+    assert!(e.guard.is_none() && f.guard.is_none());
+    let t: Extract =
+        serde_json::from_str(&of("extract in.obj out.ply --camera cam.json --tau 2 --rule truly --json"))
+            .unwrap();
+    assert!(t.rule == "truly" && t.faces <= e.faces && t.full_splits == e.full_splits);
+    let flight = "fly in.obj --path circle --frames 3 --rule truly --measure-every 2 --samples 500 --json";
+    let u: Fly = serde_json::from_str(&p.run(flight).stdout).unwrap();
+    assert!(u.rule == "truly" && u.frames[2].measured.as_ref().is_some_and(|m| m.samples > 100));
+    let guards = [t.guard.unwrap(), u.guard.unwrap()];
+    assert!(guards.iter().all(|g| g.turned <= t.full_splits && g.deferred + g.through <= 9 * t.full_splits));
     p.done("encode in.obj in.pm --paged -q");
     let g: Fly = serde_json::from_str(&of("fly in.pm --path circle --frames 2 --memory 32 --json")).unwrap();
     let paged = g.paging.unwrap();

@@ -38,6 +38,7 @@ impl Args {
             Ok(Report {
                 command: "extract",
                 to: results.format.extension(),
+                rule: "cuts",
                 tau: tau.is_finite().then_some(tau),
                 faces: scene.face_count(),
                 vertices: scene.vertex_count(),
@@ -47,6 +48,7 @@ impl Args {
                 visible_vertices: scene.visible_vertices(camera),
                 strips: self.strips.then(|| StripReport::of(scene.views().iter().map(|v| v.strips()))),
                 paging: Some(Paging::of(&scene, mib, scene.bytes())),
+                guard: None,
                 seconds: Seconds {
                     read,
                     bounds: 0.0,

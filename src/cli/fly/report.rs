@@ -1,6 +1,7 @@
 //! What a flight came to.
 
 use super::super::paging::Paging;
+use super::super::rule::Guard;
 use super::common::{short, thousands};
 use progmesh::selective::GroundJudgement;
 use serde::Serialize;
@@ -10,6 +11,7 @@ use serde::Serialize;
 pub(super) struct Report {
     command: &'static str,
     path: String,
+    pub(super) rule: &'static str,
     tau: Option<f64>,
     full_faces: usize,
     frame_count: usize,
@@ -27,6 +29,7 @@ pub(super) struct Report {
     uncovered: Option<usize>,
     memory: Memory,
     pub(super) paging: Option<Paging>,
+    pub(super) guard: Option<Guard>,
     frames: Vec<Frame>,
     seconds: Seconds,
     pub(super) warnings: Vec<String>,
@@ -150,6 +153,7 @@ impl Report {
         Report {
             command: "fly",
             path,
+            rule: "cuts",
             tau: tau.is_finite().then_some(tau),
             full_faces,
             frame_count: frames.len(),
@@ -167,6 +171,7 @@ impl Report {
             uncovered: sum(&|g| g.uncovered),
             memory,
             paging: None,
+            guard: None,
             seconds: Seconds { read, bounds },
             warnings: vec![],
             frames,
@@ -196,6 +201,9 @@ impl Report {
         }
         if let Some(m) = &self.measured_over_tau {
             lines.push(s("measured error / tau", m));
+        }
+        if let Some(g) = &self.guard {
+            lines.push(format!("  {}", g.text()));
         }
         if let Some(p) = &self.paging {
             lines.push(format!("  {}", p.text()));
