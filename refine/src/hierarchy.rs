@@ -15,14 +15,21 @@ mod bounds;
 mod cone;
 mod deviation;
 mod forest;
+mod offsets;
 mod rings;
+mod rows;
 mod settled;
 mod spheres;
+mod tree;
 
+#[cfg(test)]
+pub(crate) use bounds::pack_up;
 pub use bounds::{Bounds, Guarantee, SplitBounds};
 pub(crate) use bounds::{Packed, unpack};
 pub(crate) use cone::Cone;
-pub(crate) use forest::{Forest, SplitRows};
+pub(crate) use forest::Forest;
+pub(crate) use rows::SplitRows;
+pub(crate) use tree::Tree;
 
 use crate::progressive::{Damage, ProgressiveMesh};
 use crate::selective::Front;
@@ -104,18 +111,20 @@ fn finest(mesh: &ProgressiveMesh, rule: Rule) -> Result<(Forest, Front, Option<V
     mesh.cursor()?.seek(usize::MAX)?;
     let mut forest = Forest::new(mesh);
     let mut front = Front::new(mesh, &forest);
-    let mut row_before = std::mem::take(&mut forest.row_before);
+    let mut others = Vec::new();
     let mut rings = (rule == Rule::Rings).then(|| Rings::new(mesh, &front));
     for i in 0..forest.len() as u32 {
         if let Some(r) = &mut rings {
             r.before(mesh, &forest, &front, i)?;
         }
-        front.split(mesh, &forest, i, Some(&mut row_before))?;
+        front.split(mesh, &forest, i, Some(&mut others))?;
         if let Some(r) = &mut rings {
             r.after(mesh, &forest, &front, i);
         }
     }
-    forest.row_before = row_before;
+    if let Some(rows) = &mut forest.rows {
+        rows.set_others(others);
+    }
     let settled = rings.and_then(Rings::finish);
     let turns = match settled {
         Some((needs, turns)) => {
@@ -195,6 +204,7 @@ fn by_errors(mesh: &ProgressiveMesh, mut errors: Vec<f64>, diagonal: f64) -> Vec
 /// The finest mesh, about the middle of its box.
 struct Finest {
     positions: Vec<DVec3>,
+    /// By slots of the front; of one without a face three times the same vertex.
     corners: Vec<[u32; 3]>,
     origin: DVec3,
     diagonal: f64,
@@ -205,7 +215,7 @@ impl Finest {
     fn new(pm: &ProgressiveMesh, forest: &Forest, front: &Front) -> Finest {
         let vertices = forest.base_vertices + forest.len() as u32;
         let mut positions: Vec<DVec3> =
-            (0..vertices).map(|v| forest.position(pm, front.node(v), v)).collect();
+            (0..vertices).map(|v| forest.place(pm, v, forest.chain(v).len())).collect();
         let (lo, hi) = positions
             .iter()
             .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)));
@@ -310,8 +320,7 @@ impl Hierarchy {
     /// Where split `i` is, about the origin of the bounds, as everything is that is decided about it.
     #[inline]
     pub(crate) fn local_centre(&self, i: u32) -> glam::Vec3 {
-        let vertex = self.mesh.splits.vertex[i as usize];
-        self.bounds.place(&self.mesh, &self.forest, self.forest.parent[i as usize], vertex)
+        self.bounds.place_before(&self.mesh, &self.forest, i)
     }
 
     /// The middle of the box around the finest mesh's vertices, and the length of its diagonal.
@@ -319,7 +328,16 @@ impl Hierarchy {
         self.bounds.extent()
     }
 
-    /// Bytes of what views share, without the attributes of wedges, the input's order and the splits' estimates.
+    /// Bytes of the values of attributes, on top of [`Hierarchy::bytes`].
+    pub fn attribute_bytes(&self) -> usize {
+        let values = |w: &crate::progressive::WedgeStreams| {
+            4 * (w.rows.len() + w.base_vertex.len() + w.explicit.len()) + w.present.bytes()
+        };
+        self.mesh.wedges.as_ref().map_or(0, values)
+    }
+
+    /// Bytes of what views share, without the values of attributes, the input's order and the splits' estimates; 62 a vertex of a mesh without attributes whose collapses place vertices anew, 50 if they keep one
+    /// of the two.
     pub fn bytes(&self) -> usize {
         let m = &*self.mesh;
         let positions = |p: &crate::aif::Positions| p.len() * if p.is_f64() { 24 } else { 12 };

@@ -26,7 +26,7 @@ pub use shelf::Traffic;
 use crate::aif::NONE;
 use crate::format::{ByteRanges, FormatError, RangeReader};
 use crate::progressive::{Damage, Fans};
-use crate::selective::{Cull, Entry, Lens, LensError};
+use crate::selective::{Clock, Cull, Entry, Lens, LensError};
 use crate::view::Camera;
 use glam::{DMat4, DVec3};
 use shelf::Shelf;
@@ -63,6 +63,8 @@ struct Open {
     entry: Entry,
     /// The node it replaces.
     node: u32,
+    /// When to look at it again.
+    due: u16,
 }
 
 /// A mesh of a file between base and full detail, finer where a view needs it, whose parts are read when they are needed.
@@ -89,6 +91,9 @@ pub struct PagedView<S> {
     queue: std::collections::BinaryHeap<(u16, std::cmp::Reverse<u32>)>,
     closure: Vec<u32>,
     resume: [usize; 2],
+    clock: Clock,
+    /// The last frame did not look at all that was due.
+    cut: bool,
     limit: usize,
 }
 
@@ -99,6 +104,7 @@ impl<S: ByteRanges> PagedView<S> {
     pub fn new(reader: Arc<RangeReader<S>>, m: u32, limit: usize) -> Result<Self, PagedError> {
         let (shelf, fans) = Shelf::new(reader, m)?;
         let (vertices, faces) = (shelf.base.vertices(), fans.corners.len());
+        let clock = Clock::new(shelf.base.links.diagonal);
         let mut view = PagedView {
             shelf,
             face_in: (0..faces as u32).collect(),
@@ -114,6 +120,8 @@ impl<S: ByteRanges> PagedView<S> {
             queue: Default::default(),
             closure: Vec::new(),
             resume: [0; 2],
+            clock,
+            cut: false,
             limit,
         };
         view.open.reserve_exact(vertices);
@@ -199,7 +207,7 @@ impl<S: ByteRanges> PagedView<S> {
         self.limit = bytes;
     }
 
-    /// Bytes held: the sum of the capacities of all arrays. While a chunk is decoded, a part of the limit that is set aside for that is used as well.
+    /// Bytes held: the sum of the capacities of all arrays, but for copies of the last frame's lenses. While a chunk is decoded, a part of the limit that is set aside for that is used as well.
     pub fn bytes(&self) -> usize {
         self.shelf.bytes()
             + 28 * self.fans.corners.capacity()
@@ -286,7 +294,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         let entry = Entry::new(next, self.shelf.local_centre(k)?, bounds);
         self.shelf.set_open_place(k, self.open.len() as u32);
-        self.open.push(Open { entry, node: k });
+        self.open.push(Open { entry, node: k, due: self.clock.now() });
         Ok(())
     }
 
@@ -315,7 +323,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         let entry = Entry::new(i, self.shelf.local_centre(node)?, bounds);
         self.shelf.set_last_place(i, self.last.len() as u32);
-        self.last.push(Open { entry, node });
+        self.last.push(Open { entry, node, due: self.clock.now() });
         Ok(())
     }
 

@@ -14,6 +14,7 @@ mod fetch;
 mod input;
 pub(crate) mod links;
 mod order;
+mod presence;
 mod replay;
 
 pub(crate) use attributes::Explicit;
@@ -24,6 +25,7 @@ pub use input::{InputOrder, Polygons, same_positions};
 pub(crate) use links::{Half, link_faces};
 pub use order::NotInOrder;
 pub(crate) use order::RowsOf;
+pub use presence::Presence;
 
 use crate::aif::{Channel, NONE, Positions};
 use crate::hierarchy::Bounds;
@@ -103,6 +105,7 @@ impl SplitCode {
     pub(crate) const MOVES: u16 = 1 << 14;
     pub(crate) const ROWS: u16 = 1 << 15;
 
+    #[inline]
     fn flag(self, bit: u16) -> bool {
         self.0 & bit != 0
     }
@@ -250,7 +253,7 @@ pub struct WedgeStreams {
     /// Rows: the base's wedges, then split by split those of its new wedges and those that its changed wedges get.
     pub rows: Vec<f32>,
     /// For every row the channels it has, bit k for channel k; a wedge that has none stands for "no attributes".
-    pub present: Vec<u64>,
+    pub present: Presence,
     /// For every explicit split: the number of pairs, of changed wedges; pairs (wedge before, wedge after) of the faces that go to the
     /// new vertex, with new wedges numbered from the present count (a new wedge belongs to the new vertex, unless the new faces have it at
     /// the old vertex or at the tip: it is that vertex's then, and its first number any wedge of before); the changed wedges; the wedges of `fl` at `vt`, `vu`, `vl` (the last
@@ -323,7 +326,7 @@ impl ProgressiveMesh {
         let wedges = self
             .wedges
             .as_ref()
-            .map_or(0, |w| 4 * (w.base_vertex.len() + w.rows.len() + w.explicit.len()) + 8 * w.present.len());
+            .map_or(0, |w| 4 * (w.base_vertex.len() + w.rows.len() + w.explicit.len()) + w.present.bytes());
         12 * self.base_faces.len()
             + positions(&self.base_positions)
             + positions(&self.new_positions)

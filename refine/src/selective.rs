@@ -15,74 +15,62 @@
 
 mod adapt;
 mod changes;
+mod clock;
+mod entry;
 mod front;
+mod index;
 mod lens;
-mod list;
 mod morph;
 mod output;
+mod patch;
 mod regulator;
 mod timed;
 
-pub(crate) use adapt::{BETWEEN, LOOKS};
+pub(crate) use adapt::Meter;
 pub use adapt::{Done, Limits};
 pub use changes::Changes;
+pub(crate) use clock::{Clock, Judges};
+pub(crate) use entry::Entry;
 pub(crate) use front::Front;
 pub use lens::{Cull, Lens, LensError};
-pub(crate) use list::Entry;
+pub(crate) use patch::{Known, Sheet, split, unsplit};
 pub use regulator::Regulator;
 pub use timed::{Followed, TimedMorph};
 
-use crate::aif::NONE;
 use crate::hierarchy::Hierarchy;
-use list::List;
 use std::sync::Arc;
 
 /// A mesh between base and full detail, finer where a view needs it.
 ///
-/// Memory: about 100 B for every vertex shown, and 18 B (30 B with attributes) for every vertex of the finest mesh; [`View::bytes`] counts.
+/// Memory: about 64 B for every vertex shown, index buffer and links between faces included, and a quarter of a byte (8 B with attributes) for every vertex of the finest mesh;
+/// [`View::bytes`] counts.
 #[derive(Clone, Debug)]
 pub struct View {
     hierarchy: Arc<Hierarchy>,
     front: Front,
-    /// Splits that could be applied next: not applied, their vertex is in the mesh.
-    open: List,
-    /// Splits that could be undone next: applied, and nothing depends on them.
-    last: List,
-    /// Where each split is in the one list or the other.
-    place: Vec<u32>,
-    /// Applied splits that depend on each.
-    dependents: Vec<u16>,
     /// Bits for walks over what a split depends on; none is set between walks.
     marked: Vec<u64>,
-    /// Where the scans of the two lists go on after a limit cut them short.
-    resume: [usize; 2],
+    clock: Clock,
+    /// The record at which a limit cut short the last frame's looks.
+    resume: u32,
     /// A split that was needed when a limit cut short what it depends on.
     unfinished: Option<u32>,
     faces_before: usize,
 }
 
 impl View {
-    /// A view that shows the base.
+    /// A view that shows the base. O(base, and splits / 64).
     pub fn new(hierarchy: Arc<Hierarchy>) -> View {
         let front = Front::new(hierarchy.mesh(), &hierarchy.forest);
-        let n = hierarchy.forest.len();
-        let mut view = View {
-            front,
-            open: List::default(),
-            last: List::default(),
-            place: vec![NONE; n],
-            dependents: vec![0; n],
-            marked: vec![0; n.div_ceil(64)],
-            resume: [0; 2],
+        View {
+            marked: vec![0; hierarchy.forest.len().div_ceil(64)],
+            clock: Clock::new(hierarchy.bounds.diagonal),
+            resume: 0,
             unfinished: None,
-            faces_before: 0,
+            faces_before: front.corners().len(),
+            front,
             hierarchy,
-        };
-        for v in 0..view.hierarchy.forest.base_vertices {
-            view.offer(v);
         }
-        view.faces_before = view.front.corners().len();
-        view
     }
 
     /// What it is a view of.
@@ -115,7 +103,7 @@ impl View {
     pub fn split(&mut self, i: usize) -> usize {
         assert!(i < self.hierarchy.splits(), "split {i} of {}", self.hierarchy.splits());
         let mut all = Vec::new();
-        self.closure(i as u32, &mut all);
+        self.closure(i as u32, usize::MAX, &mut all);
         all.iter().for_each(|&j| self.apply(j));
         all.len()
     }
@@ -144,21 +132,18 @@ impl View {
     /// Bytes held: those that grow with the mesh shown, and tables over the finest mesh.
     pub fn bytes(&self) -> (usize, usize) {
         let (shown, tables) = self.front.bytes();
-        (
-            shown + self.open.bytes() + self.last.bytes(),
-            tables + 4 * self.place.len() + 2 * self.dependents.len() + 8 * self.marked.len(),
-        )
+        (shown, tables + 8 * self.marked.len())
     }
 
-    /// Appends split `i` and all it depends on that is not applied, in an order in which they can be.
-    fn closure(&mut self, i: u32, out: &mut Vec<u32>) {
+    /// Appends split `i` and all it depends on that is not applied, in an order in which they can be; false (and nothing of use) if that are more than `most`.
+    fn closure(&mut self, i: u32, most: usize, out: &mut Vec<u32>) -> bool {
         let from = out.len();
         if !self.front.is_applied(i) {
             self.marked[i as usize / 64] |= 1 << (i % 64);
             out.push(i);
         }
         let mut k = from;
-        while let Some(&j) = out.get(k) {
+        while let Some(&j) = out.get(k).filter(|_| out.len() - from <= most) {
             for &d in self.hierarchy.forest.needs.of(j) {
                 let (word, bit) = (d as usize / 64, 1u64 << (d % 64));
                 if self.marked[word] & bit == 0 && !self.front.is_applied(d) {
@@ -171,57 +156,54 @@ impl View {
         out[from..].iter().for_each(|&j| self.marked[j as usize / 64] &= !(1 << (j % 64)));
         // What a split depends on was made before it.
         out[from..].sort_unstable();
+        out.len() - from <= most
     }
 
-    /// Applies split `i`, whose dependencies are applied.
+    /// Applies split `i`, whose dependencies are applied. Both its vertices are due.
     fn apply(&mut self, i: u32) {
         let h = &*self.hierarchy;
         let done = self.front.split(h.mesh(), &h.forest, i, None);
         // The hierarchy has gone through all splits; the four faces of a split are the same in every order.
         debug_assert!(done.is_ok(), "{done:?}");
-        if done.is_err() {
-            return;
+        let Ok(record) = done else { return };
+        let old = self.front.record_of_vertex(h.mesh().splits.vertex[i as usize]);
+        for r in [record, old] {
+            self.front.records[r as usize].due = self.clock.now();
         }
-        let e = self.open.remove(i, &mut self.place).unwrap_or_else(|| Entry::of(h, i));
-        self.last.put(e, &mut self.place);
         for &d in h.forest.needs.of(i) {
-            self.dependents[d as usize] += 1;
-            self.last.remove(d, &mut self.place);
+            let r = self.front.record(d) as usize;
+            self.front.records[r].dependents += 1;
         }
-        h.forest.nodes(i).into_iter().for_each(|k| self.offer(k));
     }
 
-    /// Undoes split `i`, which is applied and free.
+    /// Undoes split `i`, which is applied and free. Its vertex is due, and so is what has become free.
     fn undo(&mut self, i: u32) {
-        let h = self.hierarchy.clone();
-        for k in h.forest.nodes(i) {
-            let below = h.forest.split_of[k as usize];
-            if below != NONE {
-                self.open.remove(below, &mut self.place);
-            }
-        }
+        let h = &*self.hierarchy;
         self.front.unsplit(h.mesh(), &h.forest, i);
-        let e = self.last.remove(i, &mut self.place).unwrap_or_else(|| Entry::of(&h, i));
-        self.open.put(e, &mut self.place);
+        let old = self.front.record_of_vertex(h.mesh().splits.vertex[i as usize]);
+        self.front.records[old as usize].due = self.clock.now();
         for &d in h.forest.needs.of(i) {
-            self.dependents[d as usize] -= 1;
-            if self.is_free(d) && self.place[d as usize] == NONE {
-                self.last.push(&h, d, &mut self.place);
+            let r = self.front.record(d) as usize;
+            let record = &mut self.front.records[r];
+            record.dependents -= 1;
+            if record.dependents == 0 {
+                record.due = self.clock.now();
             }
         }
     }
 
-    /// Nothing applied depends on split `i`, in the hierarchy or beside it.
+    /// Split `i`, which is applied, has nothing applied that depends on it, in the hierarchy or beside it.
     #[inline]
     fn is_free(&self, i: u32) -> bool {
-        self.dependents[i as usize] == 0
+        self.front.records[self.front.record(i) as usize].dependents == 0
     }
 
-    /// Node `k` is in the mesh now: what replaces it can be applied.
-    fn offer(&mut self, k: u32) {
-        let i = self.hierarchy.forest.split_of[k as usize];
-        if i != NONE {
-            self.open.push(&self.hierarchy, i, &mut self.place);
-        }
+    /// The split that would come next at the vertex of a record that is there, to be decided about; nothing for a leaf.
+    #[inline]
+    fn open(&self, record: u32) -> Option<Entry> {
+        let h = &*self.hierarchy;
+        let v = self.front.vertex_of_record(record);
+        let k = self.front.turns(&h.forest, v);
+        h.forest.chain(v).get(k).map(|&i| Entry::after(h, i, v, k))
     }
 }

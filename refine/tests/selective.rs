@@ -539,3 +539,107 @@ fn what_is_shown_deviates_by_less_than_the_tolerance() {
         assert!(name == "cad" || ratios[ratios.len() / 2] >= 0.3, "{name}: {ratios:.2?}");
     }
 }
+
+#[test]
+fn a_coherent_flight_shows_what_looking_at_everything_would() {
+    for (name, rule) in both(&["scan", "terrain", "quad-sphere"]) {
+        let h = hierarchy_by(rule, name, 4000);
+        let (centre, size) = h.extent();
+        let (mut view, mut random) = (View::new(h.clone()), Random(41));
+        let mut changed = 0;
+        for frame in 0..120 {
+            // Around it, then near and turning, then with a tolerance that changes; at times a jump.
+            let t = 0.01 * frame as f64 + if frame > 100 { 2.0 } else { 0.0 };
+            let distance = if frame < 50 { 1.0 } else { 0.3 };
+            let arm = DVec3::new(t.sin(), 0.2, t.cos()) * distance * size;
+            let turn = if frame < 50 { 0.0 } else { 0.02 * (frame - 50) as f64 };
+            let camera = Camera::new(&CameraParameters {
+                eye: centre + arm,
+                target: centre + arm - glam::DQuat::from_rotation_y(turn) * arm,
+                up: DVec3::Y,
+                projection: if frame < 20 {
+                    Projection::Orthographic { ortho_height: 0.7 * size }
+                } else {
+                    Projection::Perspective { fov_y_deg: 45.0 }
+                },
+                width: 1280,
+                height: 720,
+                near: 1e-3 * size,
+                far: 10.0 * size,
+            })
+            .unwrap();
+            let tau = if frame < 70 { 0.7 } else { 0.7 + 0.01 * (frame % 9) as f64 };
+            let lens = |p: &DMat4| Lens::new(&h, &camera, p, tau, Cull::All).unwrap();
+            // In two places from frame 90 on.
+            let other = DMat4::from_translation(0.4 * size * DVec3::X);
+            let mut lenses = vec![lens(&DMat4::IDENTITY)];
+            lenses.extend((frame >= 90).then(|| lens(&other)));
+            // Frames cut short in between must not matter.
+            if frame % 7 == 3 {
+                view.adapt_to_all(&lenses, &Limits { operations: 1 + random.below(40), ..Limits::default() });
+            }
+            let done = view.adapt_to_all(&lenses, &Limits::default());
+            assert!(done.complete);
+            changed += (done.splits > 0 && done.collapses > 0) as usize;
+            if frame % 3 == 0 || frame > 100 {
+                let mut fresh = View::new(h.clone());
+                fresh.adapt_to_all(&lenses, &Limits::default());
+                assert!(view.applied().eq(fresh.applied()), "{name}: frame {frame}");
+            }
+        }
+        assert!(changed > 15, "{name}: {changed}");
+        assert_sound(&view);
+    }
+}
+
+#[test]
+fn at_the_limit_of_faces_the_worst_is_shown_and_frames_are_short() {
+    let h = hierarchy("scan", 6000);
+    let c = camera(&h, &mut Random(5), 0.7, true);
+    let lens = |tau| Lens::new(&h, &c, &DMat4::IDENTITY, tau, Cull::All).unwrap();
+    let limits = Limits { faces: 1500, ..Limits::default() };
+    let mut view = View::new(h.clone());
+    let first = view.adapt(&lens(0.05), &limits);
+    assert!(!first.complete && first.refused > 64 && (1450..=1500).contains(&view.face_count()));
+    // Nothing moves: next to nothing is done, and what is left is still told.
+    let again = view.adapt(&lens(0.05), &limits);
+    assert!(again.splits < 30 && again.collapses == 0 && again.refused > 64 && !again.complete, "{again:?}");
+    assert!(view.face_count() <= 1500);
+    // With more room it goes on where it was.
+    let more = view.adapt(&lens(0.05), &Limits { faces: 2500, ..Limits::default() });
+    assert!(more.splits > 300 && more.collapses == 0 && view.face_count() <= 2500);
+    let mut whole = View::new(h.clone());
+    whole.adapt(&lens(0.05), &Limits::default());
+    assert!(view.adapt(&lens(0.05), &Limits::default()).complete);
+    assert!(view.applied().eq(whole.applied()));
+}
+
+#[test]
+fn memory_grows_with_what_is_shown() {
+    let h = hierarchy("scan", 20_000);
+    let n = h.splits();
+    // What is shared, without places: of f32 these are 24 B a vertex, with endpoint placement 12.
+    let structure = |h: &Hierarchy| {
+        let m = h.mesh();
+        let places = [&m.base_positions, &m.new_positions, &m.moved_positions];
+        let each = |p: &&Positions| p.len() * if p.is_f64() { 24 } else { 12 };
+        (h.bytes() - places.iter().map(each).sum::<usize>()) as f64 / m.vertices() as f64
+    };
+    assert!(structure(&h) <= 40.0, "{}", structure(&h));
+    // With normals, their values counted in.
+    let pm = progressive("torus", 8000, Method::Quadric, Some(Placement::Endpoint));
+    let torus = Hierarchy::new(Arc::new(pm), &HierarchyOptions::RINGS.with_samples(12)).unwrap();
+    let normals = torus.attribute_bytes() as f64 / torus.mesh().vertices() as f64;
+    assert!(normals > 11.9 && structure(&torus) + normals <= 52.0, "{} {normals}", structure(&torus));
+    let c = camera(&h, &mut Random(5), 1.0, true);
+    let mut view = View::new(h.clone());
+    for tau in [4.0, 1.0, 0.0] {
+        view.adapt(&Lens::new(&h, &c, &DMat4::IDENTITY, tau, Cull::None).unwrap(), &Limits::default());
+        view.take_changes();
+        let (shown, tables) = view.bytes();
+        let each = shown as f64 / view.vertex_count() as f64;
+        // Below some thousand vertices what vectors hold in reserve counts.
+        assert!(each < 68.0 || view.vertex_count() < 2000, "{each} B for each of {}", view.vertex_count());
+        assert!(tables <= n / 4 + 32, "{tables}");
+    }
+}

@@ -6,7 +6,7 @@ use super::base::MeshHead;
 use super::bounds::{self, Parts};
 use super::coder::{Bit, Coder, Decoder, Encoder, Number};
 use crate::aif::NONE;
-use crate::hierarchy::{Bounds, Forest, Packed};
+use crate::hierarchy::{Bounds, Packed, Tree};
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
@@ -77,14 +77,14 @@ impl Codec {
 /// Where links come from when they are written.
 #[derive(Clone, Copy)]
 struct Source<'a> {
-    forest: &'a Forest,
+    tree: &'a Tree,
     bounds: &'a Bounds,
 }
 
 impl Source<'_> {
     /// The split that replaces a node, if that is a later one.
     fn next(&self, node: u32) -> u32 {
-        self.forest.split_of[node as usize]
+        self.tree.split_of[node as usize]
     }
 }
 
@@ -123,9 +123,9 @@ fn code<C: Coder>(
             None => {
                 let maker = v.checked_sub(n0);
                 let start = maker.map_or(v, |j| n0 + 2 * j + 1);
-                let back = source.map_or(0, |s| match s.forest.parent[i as usize] {
+                let back = source.map_or(0, |s| match s.tree.parent[i as usize] {
                     p if p == start => 0,
-                    p => first - s.forest.maker(p),
+                    p => first - s.tree.maker(p),
                 });
                 match u32::try_from(c.number(&mut codec.parent, back as u64)).ok()? {
                     0 => start,
@@ -200,12 +200,12 @@ pub(super) fn write(
     head: &MeshHead,
     first: u32,
     vertices: &[u32],
-    forest: &Forest,
+    tree: &Tree,
     bounds: &Bounds,
 ) -> Option<(Vec<u8>, u64)> {
     let own = bounds.of.get(first as usize..first as usize + vertices.len())?;
     let mut e = Encoder::default();
-    let links = code(&mut e, head, first, vertices, own, Some(Source { forest, bounds }))?;
+    let links = code(&mut e, head, first, vertices, own, Some(Source { tree, bounds }))?;
     let mut out = Vec::new();
     e.finish(&mut out);
     Some((out, raw_bytes(&links)))
@@ -231,14 +231,14 @@ pub(crate) fn read(
 }
 
 /// The `PAGE` of a base.
-pub(super) fn write_base(head: &MeshHead, forest: &Forest, bounds: &Bounds) -> Option<(Vec<u8>, u64)> {
+pub(super) fn write_base(head: &MeshHead, tree: &Tree, bounds: &Bounds) -> Option<(Vec<u8>, u64)> {
     let mut out = Vec::new();
     let (origin, diagonal) = bounds.extent();
     for x in origin.to_array().into_iter().chain([diagonal]) {
         out.extend_from_slice(&x.to_le_bytes());
     }
     let mut e = Encoder::default();
-    code_base(&mut e, head, &mut BaseLinks::default(), Some(Source { forest, bounds }))?;
+    code_base(&mut e, head, &mut BaseLinks::default(), Some(Source { tree, bounds }))?;
     e.finish(&mut out);
     Some((out, raw_bytes_of_base(head)))
 }

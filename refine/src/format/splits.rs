@@ -83,7 +83,7 @@ impl SplitBlock {
         append(&mut pm.moved_positions, &self.moved_positions);
         if let Some(w) = &mut pm.wedges {
             w.rows.extend_from_slice(&self.rows);
-            w.present.extend_from_slice(&self.present);
+            w.present.extend(self.present.iter().copied());
             w.explicit.extend_from_slice(&self.explicit);
         }
         pm.face_material.extend_from_slice(&self.face_material);

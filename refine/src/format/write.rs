@@ -10,7 +10,7 @@ use super::pages;
 use super::places;
 use super::plan::{Layout, Piece, Plan};
 use super::splits::{self, Counts};
-use crate::hierarchy::{Bounds, Forest, Guarantee};
+use crate::hierarchy::{Bounds, Guarantee, Tree};
 use crate::progressive::{Damage, ProgressiveMesh, RowsOf};
 use std::sync::Arc;
 
@@ -311,10 +311,10 @@ fn encode_mesh(
         _ => None,
     };
     let paged = bounds.as_ref().filter(|_| options.pages && !options.sequential);
-    let paged = paged.map(|b| (b, Forest::new(&pm)));
+    let paged = paged.map(|b| (b, Tree::new(&pm)));
     let page = match &paged {
-        Some((bounds, forest)) => {
-            let (bytes, raw) = pages::write_base(&head, forest, bounds)?;
+        Some((bounds, tree)) => {
+            let (bytes, raw) = pages::write_base(&head, tree, bounds)?;
             let mut page = part(ChunkType::PAGE, false, m, raw, bytes);
             (page.chunk.count, page.chunk.first_face) = (head.base_vertices, head.base_wedges);
             Some(page)
@@ -328,10 +328,10 @@ fn encode_mesh(
             None => None,
         };
         let page = match &paged {
-            Some((bounds, forest)) => {
+            Some((bounds, tree)) => {
                 let Chunk { first, count, band, subtree, error, .. } = p.chunk;
                 let vertices = &pm.splits.vertex[at.split..at.split + count as usize];
-                let (bytes, raw) = pages::write(&head, first, vertices, forest, bounds)?;
+                let (bytes, raw) = pages::write(&head, first, vertices, tree, bounds)?;
                 let mut page = part(ChunkType::PAGE, false, m, raw, bytes);
                 page.chunk = Chunk { first, count, band, subtree, error, ..page.chunk };
                 page.chunk.first_face = at.wedge as u32;

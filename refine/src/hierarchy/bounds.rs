@@ -156,14 +156,14 @@ impl Bounds {
         }
         let mut bounds = Bounds::with_errors(mesh, errors, guarantee)?;
         let forest = super::Forest::new(mesh);
-        let centre =
-            |b: &Bounds, i: usize| b.place(mesh, &forest, forest.parent[i], mesh.splits.vertex[i]).as_dvec3();
+        let centre = |b: &Bounds, i: usize| b.place_before(mesh, &forest, i as u32).as_dvec3();
         // As of the spheres: rounding of centres never shows.
         let slack = bounds.diagonal * 1e-6;
         let mut least: Vec<f64> = radii.iter().map(|r| r.max(0.0) + slack).collect();
+        let ups = forest.ups();
         for i in (0..least.len()).rev() {
             bounds.of[i].radius = bounds.of[i].radius.max(pack_up(least[i]));
-            let up = forest.maker(forest.parent[i]) as usize;
+            let up = ups[i] as usize;
             if let Some(above) = least.get_mut(up) {
                 let reach = centre(&bounds, i).distance(centre(&bounds, up)) + bounds.radius(i) + slack;
                 *above = above.max(reach);
@@ -174,10 +174,11 @@ impl Bounds {
 
     /// Keeps errors, raised to nest.
     pub(crate) fn set_errors(&mut self, forest: &super::Forest, mut errors: Vec<f64>) {
+        let ups = forest.ups();
         for i in (0..errors.len()).rev() {
             let e = errors[i];
             self.of[i].error = pack_up(e);
-            if let Some(up) = errors.get_mut(forest.maker(forest.parent[i]) as usize) {
+            if let Some(up) = errors.get_mut(ups[i] as usize) {
                 *up = up.max(e);
             }
         }
@@ -264,10 +265,15 @@ impl Bounds {
         SplitBounds { centre, radius: self.radius(i), cone: self.cone(i), error: self.error(i) }
     }
 
-    /// Where node `k`, which is `vertex`, stands, as everything is that is decided about it: about the origin, rounded.
+    /// Where a place is for all that is decided about it: about the origin, rounded.
     #[inline]
-    pub(crate) fn place(&self, mesh: &ProgressiveMesh, forest: &super::Forest, k: u32, vertex: u32) -> Vec3 {
-        (forest.position(mesh, k, vertex) - self.origin).as_vec3()
+    pub(crate) fn local(&self, p: DVec3) -> Vec3 {
+        (p - self.origin).as_vec3()
+    }
+
+    /// The same of the vertex of split `i` before it.
+    pub(crate) fn place_before(&self, mesh: &ProgressiveMesh, forest: &super::Forest, i: u32) -> Vec3 {
+        self.local(forest.place_before(mesh, mesh.splits.vertex[i as usize], i))
     }
 
     /// Every split's error and sphere hold those below; else a split of which they do not.
@@ -275,10 +281,10 @@ impl Bounds {
         if self.len() != forest.len() {
             return Err(Damage::Length { what: "bounds", len: self.len(), want: forest.len() });
         }
-        let splits = &mesh.splits.vertex;
-        let centre = |i: usize| self.place(mesh, forest, forest.parent[i], splits[i]).as_dvec3();
+        let centre = |i: usize| self.place_before(mesh, forest, i as u32).as_dvec3();
+        let ups = forest.ups();
         for i in 0..self.len() {
-            let up = forest.maker(forest.parent[i]) as usize;
+            let up = ups[i] as usize;
             if let Some(above) = self.of.get(up) {
                 let reach = centre(i).distance(centre(up)) + self.radius(i);
                 if self.of[i].error > above.error || reach > self.radius(up) {

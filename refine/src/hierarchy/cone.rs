@@ -1,7 +1,7 @@
 //! Normal cones, packed into four bytes.
 
 use crate::view::NormalCone;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 /// A normal cone as it is stored: its axis as a point of an octahedron, 10 bits each way, and 12 bits for its half angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,18 +37,14 @@ impl Cone {
 
     /// Axis, and cosine and sine of the half angle; a cosine of -1 for a cone that tells nothing.
     #[inline]
-    pub(crate) fn unpack_parts(self) -> (Vec3, f32, f32) {
+    pub(crate) fn unpack_parts(self) -> (DVec3, f64, f64) {
         let steps = self.0 >> 20;
         if steps == WIDE {
-            return (Vec3::Z, -1.0, 0.0);
+            return (DVec3::Z, -1.0, 0.0);
         }
+        // In f32: stored cones are wider than what they are around by more than that rounds.
         let (sin, cos) = (steps as f32 * (std::f32::consts::FRAC_PI_2 / STEPS as f32)).sin_cos();
-        // In f32 throughout: stored cones are wider than what they are around by more than that rounds.
-        let of = |c: u32| (c & 0x3ff) as f32 * (2.0 / SIDE as f32) - 1.0;
-        let (x, y) = (of(self.0), of(self.0 >> 10));
-        let z = 1.0 - x.abs() - y.abs();
-        let fold = (-z).max(0.0);
-        (Vec3::new(x - fold.copysign(x), y - fold.copysign(y), z).normalize(), cos, sin)
+        (unpack_direction(self.0), cos as f64, sin as f64)
     }
 }
 
@@ -91,8 +87,8 @@ mod tests {
             // 0.3 degrees.
             assert!(back.half_angle() < cone.half_angle() + 5.2e-3);
             let (axis, cos, sin) = stored.unpack_parts();
-            assert!(axis.as_dvec3().angle_between(back.axis()) < 1e-6);
-            assert!((sin as f64).atan2(cos as f64) > cone.half_angle() + off + 1e-5);
+            assert!(axis.angle_between(back.axis()) < 1e-6);
+            assert!(sin.atan2(cos) > cone.half_angle() + off + 1e-5);
         }
         assert_eq!(Cone::around(&NormalCone::ALL), Cone::ALL);
         assert_eq!(Cone::ALL.unpack(), NormalCone::ALL);

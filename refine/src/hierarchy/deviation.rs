@@ -82,7 +82,7 @@ pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: &Front, opti
     for round in 0..options.rounds {
         let cell = diagonal / [f64::INFINITY, 6.0, 17.0][round as usize % 3];
         let weight = |i: u32| {
-            let p = forest.position(pm, forest.parent[i as usize], pm.splits.vertex[i as usize]) - origin;
+            let p = forest.place_before(pm, pm.splits.vertex[i as usize], i) - origin;
             let k = (p / cell.max(f64::MIN_POSITIVE)).floor();
             // Every other cell, like the fields of a chess board, is as if it were out of view.
             let odd = (k.x + k.y + k.z).rem_euclid(2.0) == 1.0;
@@ -128,7 +128,7 @@ impl<'a> Walk<'a> {
         let mut samples: Vec<Sample> = Vec::with_capacity(10 * positions.len());
         let mut first = vec![NONE; corners.len()];
         let mut seen = vec![false; positions.len()];
-        for (slot, f) in corners.iter().enumerate() {
+        for (slot, f) in corners.iter().enumerate().filter(|(_, f)| f[0] != f[1]) {
             let mut add = |at: DVec3, owners: [u32; 2], kind: Kind| {
                 samples.push(Sample { at, owners, next: first[slot], distance: 0.0, kind });
                 first[slot] = (samples.len() - 1) as u32;
@@ -179,10 +179,10 @@ impl<'a> Walk<'a> {
         let k = i as usize;
         let (vs, vu) = (self.pm.splits.vertex[k], self.forest.base_vertices + i);
         let mut star = Vec::with_capacity(16);
-        let [old, new] = self.front.middle(self.pm, self.forest, i);
+        let [old, new] = self.front.middle(self.pm, i);
         self.front.star(old, &mut star);
         self.front.star(new, &mut star);
-        let beside = self.front.beside(self.pm, self.forest, i);
+        let beside = self.front.beside(self.pm, i);
         let mut loose = Vec::with_capacity(64);
         for slot in star {
             let mut s = std::mem::replace(&mut self.first[slot as usize], NONE);
@@ -192,7 +192,7 @@ impl<'a> Walk<'a> {
             }
         }
         self.front.unsplit(self.pm, self.forest, i);
-        self.positions[vs as usize] = self.forest.position(self.pm, self.forest.parent[k], vs) - origin;
+        self.positions[vs as usize] = self.forest.place_before(self.pm, vs, i) - origin;
         self.into[vu as usize] = vs;
         let below = [self.candidate[vs as usize], self.candidate[vu as usize]];
         self.candidate[vs as usize] = i;

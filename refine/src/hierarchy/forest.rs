@@ -1,6 +1,8 @@
-//! What a split hangs on and what hangs on it: the vertex hierarchy and the l/r rule, as flat arrays.
+//! What a split hangs on and what hangs on it: the vertex hierarchy, in flat arrays as small as can be.
 
+use super::offsets::Offsets;
 use super::rings::Needs;
+use super::rows::Rows;
 use crate::aif::{NONE, Positions};
 use crate::progressive::ProgressiveMesh;
 use glam::DVec3;
@@ -9,33 +11,23 @@ use glam::DVec3;
 ///
 /// A *node* is a vertex as it is between two splits: the base's are `0..n0`, split `i` makes `n0 + 2 i` (the old vertex from then on) and
 /// `n0 + 2 i + 1` (the new one). Every node has at most one split that replaces it.
+///
+/// What replaces what follows from the *chain* of each vertex, its splits in their order: 4 B a split, and where the chain begins.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Forest {
     pub(crate) base_vertices: u32,
     base_faces: u32,
-    /// The node that each split replaces.
-    pub(crate) parent: Vec<u32>,
-    /// The split that replaces each node; [`NONE`] for a leaf.
-    pub(crate) split_of: Vec<u32>,
+    faces: u32,
+    starts: Offsets,
+    chains: Vec<u32>,
     two_faces: Ranks,
+    /// The split that makes every 64th face of splits.
+    makers: Vec<u32>,
     moves: Ranks,
     /// What splits need by the rule of the hierarchy.
     pub(crate) needs: Needs,
-    /// Where splits have their attributes; empty without.
-    pub(crate) rows: Vec<SplitRows>,
-    /// For every row of a changed wedge, at the row, the row that the wedge had before; for others themselves. Empty without attributes.
-    pub(crate) row_before: Vec<u32>,
-}
-
-/// Where a split has its attributes.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct SplitRows {
-    /// Its first new wedge.
-    pub(crate) wedge: u32,
-    /// Its first row.
-    pub(crate) row: u32,
-    /// Its entry of the explicit stream, if it has one.
-    pub(crate) explicit: u32,
+    /// Where splits have their attributes; nothing without.
+    pub(crate) rows: Option<Rows>,
 }
 
 /// Bits, and how many are set before each of them.
@@ -81,52 +73,89 @@ impl Ranks {
 impl Forest {
     /// Of a progressive mesh whose references are sound. O(n).
     pub(crate) fn new(pm: &ProgressiveMesh) -> Forest {
-        let (n0, n) = (pm.base_vertices() as u32, pm.splits.len());
-        let mut split_of = vec![NONE; n0 as usize + 2 * n];
-        // The node that each vertex slot is at.
-        let mut node: Vec<u32> = (0..n0).collect();
-        let mut parent = Vec::with_capacity(n);
-        for (i, &v) in (0u32..).zip(&pm.splits.vertex) {
-            let at = node[v as usize];
-            parent.push(at);
-            split_of[at as usize] = i;
-            node[v as usize] = n0 + 2 * i;
-            node.push(n0 + 2 * i + 1);
+        let (vertices, n) = (pm.vertices(), pm.splits.len());
+        let mut starts = vec![0u32; vertices + 1];
+        pm.splits.vertex.iter().for_each(|&v| starts[v as usize + 1] += 1);
+        for v in 0..vertices {
+            starts[v + 1] += starts[v];
         }
-        let rows = match &pm.wedges {
-            None => Vec::new(),
-            Some(w) => {
-                let mut wedge = w.base_vertex.len() as u32;
-                let each = pm.rows_of_splits().into_iter().map(|r| {
-                    let at = SplitRows { wedge, row: r.first_row as u32, explicit: r.explicit.start as u32 };
-                    wedge += r.new;
-                    at
-                });
-                each.collect()
+        let mut next = starts.clone();
+        let mut chains = vec![0; n];
+        for (i, &v) in (0u32..).zip(&pm.splits.vertex) {
+            chains[next[v as usize] as usize] = i;
+            next[v as usize] += 1;
+        }
+        let mut face = 0u32;
+        let mut makers = Vec::with_capacity(n / 32 + 1);
+        for (i, code) in (0u32..).zip(&pm.splits.code) {
+            face += 1 + code.two_faces() as u32;
+            while 64 * makers.len() < face as usize {
+                makers.push(i);
             }
-        };
+        }
+        let base_faces = pm.base_faces.len() as u32;
         Forest {
-            base_vertices: n0,
-            base_faces: pm.base_faces.len() as u32,
-            parent,
-            split_of,
+            base_vertices: pm.base_vertices() as u32,
+            base_faces,
+            faces: base_faces + face,
+            starts: Offsets::new(starts),
+            chains,
             two_faces: Ranks::new(pm.splits.code.iter().map(|c| c.two_faces())),
+            makers,
             moves: Ranks::new(pm.splits.code.iter().map(|c| c.moves())),
             needs: Needs::default(),
-            rows,
-            row_before: pm
-                .wedges
-                .as_ref()
-                .map_or(0, |w| w.present.len())
-                .try_into()
-                .map_or(Vec::new(), |n: u32| (0..n).collect()),
+            rows: Rows::new(pm),
         }
     }
 
     /// Splits.
     #[inline]
     pub(crate) fn len(&self) -> usize {
-        self.parent.len()
+        self.chains.len()
+    }
+
+    /// Faces at full detail.
+    pub(crate) fn faces(&self) -> usize {
+        self.faces as usize
+    }
+
+    /// The splits of vertex `v`, ascending.
+    #[inline(always)]
+    pub(crate) fn chain(&self, v: u32) -> &[u32] {
+        &self.chains[self.starts.run(v)]
+    }
+
+    /// How many splits of its vertex come before split `i`.
+    #[inline]
+    fn turn(&self, pm: &ProgressiveMesh, i: u32) -> usize {
+        self.chain(pm.splits.vertex[i as usize]).partition_point(|&j| j < i)
+    }
+
+    /// The node of vertex `v` after the first `k` splits of its chain.
+    #[inline]
+    pub(crate) fn node_after(&self, v: u32, k: usize) -> u32 {
+        match (k.checked_sub(1), v.checked_sub(self.base_vertices)) {
+            (Some(last), _) => self.base_vertices + 2 * self.chain(v)[last],
+            (None, Some(maker)) => self.base_vertices + 2 * maker + 1,
+            (None, None) => v,
+        }
+    }
+
+    /// The node that split `i` replaces. O(log chain).
+    pub(crate) fn parent(&self, pm: &ProgressiveMesh, i: u32) -> u32 {
+        self.node_after(pm.splits.vertex[i as usize], self.turn(pm, i))
+    }
+
+    /// For every split the one that made the node it replaces; [`NONE`] for nodes of the base. O(n).
+    pub(crate) fn ups(&self) -> Vec<u32> {
+        let mut ups = vec![NONE; self.len()];
+        for v in 0..self.base_vertices + self.len() as u32 {
+            let mut up = v.checked_sub(self.base_vertices).unwrap_or(NONE);
+            for &i in self.chain(v) {
+                ups[i as usize] = std::mem::replace(&mut up, i);
+            }
+        }
+        ups
     }
 
     /// The split that made a node; [`NONE`] for the base's.
@@ -142,61 +171,105 @@ impl Forest {
         [old, old + 1]
     }
 
+    /// Where the new vertex of split `i` stands; and the old one after it, if that moves it.
+    #[inline]
+    pub(crate) fn places_after(&self, pm: &ProgressiveMesh, i: u32) -> (DVec3, Option<DVec3>) {
+        let moved = self.moves.get(i).then(|| pm.moved_positions.get(self.moves.before(i) as usize));
+        (pm.new_positions.get(i as usize), moved)
+    }
+
+    /// The splits that replace those two nodes; [`NONE`] for a leaf.
+    #[inline]
+    pub(crate) fn below(&self, pm: &ProgressiveMesh, i: u32) -> [u32; 2] {
+        let chain = self.chain(pm.splits.vertex[i as usize]);
+        let old = chain.get(chain.partition_point(|&j| j <= i));
+        let new = self.chain(self.base_vertices + i).first();
+        [old, new].map(|s| s.copied().unwrap_or(NONE))
+    }
+
+    /// Split `i` makes two faces.
+    #[inline]
+    pub(crate) fn two_faces(&self, i: u32) -> bool {
+        self.two_faces.get(i)
+    }
+
     /// The first face that split `i` makes.
     #[inline]
     pub(crate) fn first_face(&self, i: u32) -> u32 {
         self.base_faces + i + self.two_faces.before(i)
     }
 
-    /// Where node `k` stands. O(splits of the vertex that do not move it).
+    /// The split that makes face `f`, and whether it is its second; `None` of a face of the base, or where there is none.
     #[inline]
-    pub(crate) fn position(&self, pm: &ProgressiveMesh, mut k: u32, vertex: u32) -> DVec3 {
-        let n0 = self.base_vertices;
-        if self.moves.set == 0 {
-            return match vertex.checked_sub(n0) {
-                None => pm.base_positions.get(vertex as usize),
-                Some(i) => pm.new_positions.get(i as usize),
-            };
+    pub(crate) fn maker_of_face(&self, f: u32) -> Option<(u32, bool)> {
+        if f >= self.faces {
+            return None;
         }
+        let k = f.checked_sub(self.base_faces)?;
+        let mut i = self.makers[k as usize / 64];
         loop {
-            let Some(at) = k.checked_sub(n0) else { return pm.base_positions.get(k as usize) };
-            let i = at >> 1;
-            if at & 1 == 1 {
-                return pm.new_positions.get(i as usize);
+            let ahead = k - (i + self.two_faces.before(i));
+            if ahead == 0 || (ahead == 1 && self.two_faces.get(i)) {
+                return Some((i, ahead == 1));
             }
-            if self.moves.get(i) {
-                return pm.moved_positions.get(self.moves.before(i) as usize);
-            }
-            k = self.parent[i as usize];
+            // Never beyond it: a split makes two at most.
+            i += (ahead / 2).max(1);
         }
     }
 
-    /// The same, in the stored precision, appended to `out`.
-    pub(crate) fn append_position(&self, pm: &ProgressiveMesh, mut k: u32, out: &mut Positions) {
-        let n0 = self.base_vertices;
-        let (from, i) = loop {
-            let Some(at) = k.checked_sub(n0) else { break (&pm.base_positions, k) };
-            let i = at >> 1;
-            if at & 1 == 1 {
-                break (&pm.new_positions, i);
-            }
-            if self.moves.get(i) {
-                break (&pm.moved_positions, self.moves.before(i));
-            }
-            k = self.parent[i as usize];
+    /// Where vertex `v` stands after the first `k` splits of its chain: the array, and the place in it.
+    #[inline]
+    fn stored<'a>(&self, pm: &'a ProgressiveMesh, v: u32, k: usize) -> (&'a Positions, usize) {
+        if self.moves.set > 0
+            && k > 0
+            && let Some(&j) = self.chain(v)[..k].iter().rev().find(|&&j| self.moves.get(j))
+        {
+            return (&pm.moved_positions, self.moves.before(j) as usize);
+        }
+        match v.checked_sub(self.base_vertices) {
+            None => (&pm.base_positions, v as usize),
+            Some(i) => (&pm.new_positions, i as usize),
+        }
+    }
+
+    /// Where vertex `v` stands after the first `k` splits of its chain. O(splits of it that do not move it).
+    #[inline]
+    pub(crate) fn place(&self, pm: &ProgressiveMesh, v: u32, k: usize) -> DVec3 {
+        let (from, at) = self.stored(pm, v, k);
+        from.get(at)
+    }
+
+    /// Where vertex `v` stands before split `i`, one of its chain.
+    #[inline]
+    pub(crate) fn place_before(&self, pm: &ProgressiveMesh, v: u32, i: u32) -> DVec3 {
+        self.place(pm, v, self.chain(v).partition_point(|&j| j < i))
+    }
+
+    /// Where node `k`, which is vertex `v`, stands.
+    pub(crate) fn position(&self, pm: &ProgressiveMesh, k: u32, v: u32) -> DVec3 {
+        let after = match k.checked_sub(self.base_vertices) {
+            Some(at) if at & 1 == 0 => self.chain(v).partition_point(|&j| j <= at >> 1),
+            _ => 0,
         };
+        self.place(pm, v, after)
+    }
+
+    /// [`Forest::place`] in the stored precision, appended to `out`.
+    pub(crate) fn append_place(&self, pm: &ProgressiveMesh, v: u32, k: usize, out: &mut Positions) {
+        let (from, i) = self.stored(pm, v, k);
         match (from, out) {
-            (Positions::F32(a), Positions::F32(b)) => b.push(a[i as usize]),
-            (Positions::F64(a), Positions::F64(b)) => b.push(a[i as usize]),
+            (Positions::F32(a), Positions::F32(b)) => b.push(a[i]),
+            (Positions::F64(a), Positions::F64(b)) => b.push(a[i]),
             _ => {}
         }
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        4 * (self.parent.len() + self.split_of.len() + self.row_before.len())
+        4 * (self.chains.len() + self.makers.len())
+            + self.starts.bytes()
             + self.needs.bytes()
-            + 12 * self.rows.len()
+            + self.rows.as_ref().map_or(0, Rows::bytes)
             + self.two_faces.bytes()
             + self.moves.bytes()
     }
@@ -204,7 +277,9 @@ impl Forest {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Tree;
     use super::*;
+    use crate::progressive::{SplitCode, Splits};
 
     #[test]
     fn ranks_count_what_is_set_before() {
@@ -214,5 +289,64 @@ mod tests {
             assert_eq!(r.before(i as u32) as usize, bits[..i].iter().filter(|b| **b).count());
             assert_eq!(r.get(i as u32), bits[i]);
         }
+    }
+
+    /// Splits of any vertices, of one face or two; some move theirs. No mesh: only what the forest looks at.
+    fn any() -> ProgressiveMesh {
+        let n = 400u32;
+        let code = |i: u32| {
+            let two = if i % 5 < 3 || i > 300 { SplitCode::TWO_FACES } else { 0 };
+            SplitCode(two | if i % 3 == 1 { SplitCode::MOVES } else { 0 })
+        };
+        let code: Vec<SplitCode> = (0..n).map(code).collect();
+        let moved = code.iter().filter(|c| c.moves()).count();
+        let points = |n: usize, x: f32| Positions::F32((0..n).map(|k| [k as f32, x, 0.0]).collect());
+        ProgressiveMesh {
+            base_faces: vec![[0, 1, 2]; 7],
+            base_positions: points(3, 1.0),
+            new_positions: points(n as usize, 2.0),
+            moved_positions: points(moved, 3.0),
+            splits: Splits {
+                vertex: (0..n).map(|i| i.wrapping_mul(2654435761) % (3 + i)).collect(),
+                code,
+                ..Default::default()
+            },
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn chains_tell_what_the_tree_does() {
+        let pm = any();
+        let (f, tree) = (Forest::new(&pm), Tree::new(&pm));
+        let ups = f.ups();
+        let (mut face, mut moved) = (7, 0);
+        let mut places: Vec<DVec3> = (0..3).map(|v| pm.base_positions.get(v)).collect();
+        for i in 0..pm.splits.len() as u32 {
+            let k = i as usize;
+            let (code, v) = (pm.splits.code[k], pm.splits.vertex[k]);
+            assert_eq!(f.parent(&pm, i), tree.parent[k]);
+            assert_eq!(ups[k], tree.maker(tree.parent[k]));
+            assert_eq!(f.below(&pm, i), f.nodes(i).map(|node| tree.split_of[node as usize]));
+            assert_eq!(f.first_face(i), face);
+            assert_eq!(f.maker_of_face(face), Some((i, false)));
+            if code.two_faces() {
+                assert_eq!(f.maker_of_face(face + 1), Some((i, true)));
+            }
+            face += 1 + code.two_faces() as u32;
+            assert_eq!(f.position(&pm, tree.parent[k], v), places[v as usize]);
+            assert_eq!(f.place_before(&pm, v, i), places[v as usize]);
+            if code.moves() {
+                places[v as usize] = pm.moved_positions.get(moved);
+                moved += 1;
+            }
+            places.push(pm.new_positions.get(k));
+            let [old, new] = f.nodes(i);
+            assert_eq!(f.position(&pm, old, v), places[v as usize]);
+            assert_eq!(f.position(&pm, new, 3 + i), places[3 + k]);
+        }
+        assert_eq!((f.maker_of_face(6), f.maker_of_face(face)), (None, None));
+        // Of 12 B that the tree takes.
+        assert!(f.bytes() < 8 * pm.splits.len(), "{}", f.bytes());
     }
 }

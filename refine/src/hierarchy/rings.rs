@@ -14,6 +14,7 @@
 //! more splits than are needed themselves.
 
 use super::Forest;
+use super::offsets::Offsets;
 use crate::aif::NONE;
 use crate::progressive::{Damage, ProgressiveMesh};
 use crate::selective::Front;
@@ -21,43 +22,45 @@ use crate::selective::Front;
 /// For every split those it needs directly, and of which nothing else that it needs tells as much.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Needs {
-    starts: Vec<u32>,
+    starts: Offsets,
     on: Vec<u32>,
 }
 
 impl Needs {
     /// By the cuts.
     pub(super) fn of_cuts(pm: &ProgressiveMesh) -> Needs {
-        let mut all = Needs::default();
+        let (mut starts, mut all) = (vec![0], Vec::new());
         for on in pm.dependencies() {
             let mut on = on;
             on.sort_unstable();
-            all.starts.push(all.on.len() as u32);
-            let from = all.on.len();
+            let from = all.len();
             for d in on.into_iter().filter(|&d| d != NONE) {
-                if all.on.len() == from || all.on.last() != Some(&d) {
-                    all.on.push(d);
+                if all.len() == from || all.last() != Some(&d) {
+                    all.push(d);
                 }
             }
+            starts.push(all.len() as u32);
         }
-        all.starts.push(all.on.len() as u32);
-        all
+        all.shrink_to_fit();
+        Needs { starts: Offsets::new(starts), on: all }
     }
 
     /// What split `i` needs, each once.
     #[inline]
     pub(crate) fn of(&self, i: u32) -> &[u32] {
-        &self.on[self.starts[i as usize] as usize..self.starts[i as usize + 1] as usize]
+        &self.on[self.starts.run(i)]
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        4 * (self.starts.len() + self.on.len())
+        self.starts.bytes() + 4 * self.on.len()
     }
 }
 
 /// Collects what splits need by the ring rule, while they are made in their order.
 pub(super) struct Rings {
-    needs: Needs,
+    /// As of [`Needs`].
+    starts: Vec<u32>,
+    all: Vec<u32>,
     /// The last split that touched each face.
     last: Vec<u32>,
     /// Faces at each vertex, of all its fans.
@@ -73,11 +76,13 @@ pub(super) struct Rings {
 impl Rings {
     pub(super) fn new(pm: &ProgressiveMesh, front: &Front) -> Rings {
         let mut valence = vec![0; pm.vertices()];
+        // The base: every slot has a face.
         for w in front.corners().iter().flatten() {
             valence[front.wedge_vertex(*w) as usize] += 1;
         }
         Rings {
-            needs: Needs { starts: vec![0], on: Vec::new() },
+            starts: vec![0],
+            all: Vec::new(),
             last: vec![NONE; pm.faces()],
             valence,
             star: Vec::new(),
@@ -96,27 +101,28 @@ impl Rings {
         i: u32,
     ) -> Result<(), Damage> {
         self.star.clear();
-        front.ring(pm, i, &mut self.star)?;
-        let face = |slot: u32| front.face_in()[slot as usize];
+        front.ring(pm, forest, i, &mut self.star)?;
+        let face = |slot: u32| front.face_in(forest, slot);
         self.on.clear();
-        self.on.push(forest.maker(forest.parent[i as usize]));
+        self.on.push(forest.maker(forest.parent(pm, i)));
         self.on.extend(self.star.iter().map(|&s| self.last[face(s) as usize]));
         self.on.retain(|&d| d != NONE);
         // The latest first: what it needs is needed through it.
         self.on.sort_unstable_by(|a, b| b.cmp(a));
         self.on.dedup();
-        let from = self.needs.on.len();
+        let from = self.all.len();
+        let of = |i: u32, starts: &[u32]| starts[i as usize] as usize..starts[i as usize + 1] as usize;
         self.turns.push(self.on.iter().map(|&d| self.turns[d as usize]).max().unwrap_or(0) + 1);
         for &d in &self.on {
             let through = |&e: &u32| {
-                let first = self.needs.of(e);
-                first.contains(&d) || first.iter().any(|&k| k > d && self.needs.of(k).contains(&d))
+                let needs = |k: u32| &self.all[of(k, &self.starts)];
+                needs(e).contains(&d) || needs(e).iter().any(|&k| k > d && needs(k).contains(&d))
             };
-            if !self.needs.on[from..].iter().any(through) {
-                self.needs.on.push(d);
+            if !self.all[from..].iter().any(through) {
+                self.all.push(d);
             }
         }
-        self.needs.starts.push(self.needs.on.len() as u32);
+        self.starts.push(self.all.len() as u32);
         let vs = pm.splits.vertex[i as usize] as usize;
         self.whole &= !pm.splits.code[i as usize].moves() || self.valence[vs] as usize == self.star.len();
         for &s in &self.star {
@@ -132,11 +138,11 @@ impl Rings {
         let (vs, vu) = (pm.splits.vertex[i as usize], forest.base_vertices + i);
         for f in first..first + made {
             self.last[f as usize] = i;
-            for w in front.corners()[front.slot_of(f) as usize] {
+            for w in front.corners()[front.slot_of(forest, f) as usize] {
                 self.valence[front.wedge_vertex(w) as usize] += 1;
             }
         }
-        let [_, new] = front.middle(pm, forest, i);
+        let [_, new] = front.middle(pm, i);
         self.star.clear();
         front.star(new, &mut self.star);
         let went = self.star.len() as u32 - made.min(self.star.len() as u32);
@@ -145,11 +151,13 @@ impl Rings {
     }
 
     /// What splits need, and the longest chains to each; `None` if the rule does not hold for this mesh.
-    pub(super) fn finish(self) -> Option<(Needs, Vec<u32>)> {
+    pub(super) fn finish(mut self) -> Option<(Needs, Vec<u32>)> {
         let mut dependents = vec![0u32; self.turns.len()];
-        self.needs.on.iter().for_each(|&d| dependents[d as usize] += 1);
+        self.all.iter().for_each(|&d| dependents[d as usize] += 1);
         // Views count them in 16 bits.
         let few = dependents.iter().all(|&n| n <= u16::MAX.into());
-        (self.whole && few).then_some((self.needs, self.turns))
+        self.all.shrink_to_fit();
+        let needs = Needs { starts: Offsets::new(self.starts), on: self.all };
+        (self.whole && few).then_some((needs, self.turns))
     }
 }

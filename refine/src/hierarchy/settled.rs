@@ -92,13 +92,14 @@ struct Around {
 impl Around {
     fn new(finest: &Finest) -> Around {
         let mut starts = vec![0u32; finest.positions.len() + 1];
-        finest.corners.iter().flatten().for_each(|&v| starts[v as usize + 1] += 1);
+        let full = |f: &&[u32; 3]| f[0] != f[1];
+        finest.corners.iter().filter(full).flatten().for_each(|&v| starts[v as usize + 1] += 1);
         for v in 1..starts.len() {
             starts[v] += starts[v - 1];
         }
         let mut at = starts.clone();
         let mut faces = vec![0; 3 * finest.corners.len()];
-        for (f, corners) in (0u32..).zip(&finest.corners) {
+        for (f, corners) in (0u32..).zip(&finest.corners).filter(|(_, f)| full(f)) {
             for &v in corners {
                 faces[at[v as usize] as usize] = f;
                 at[v as usize] += 1;
@@ -163,7 +164,7 @@ impl<'a> Walk<'a> {
         let mut samples: Vec<Sample> = Vec::with_capacity(12 * positions.len());
         let mut first = vec![NONE; corners.len()];
         let mut seen = vec![false; positions.len()];
-        for (slot, f) in corners.iter().enumerate() {
+        for (slot, f) in corners.iter().enumerate().filter(|(_, f)| f[0] != f[1]) {
             let mut add = |at: DVec3, of: [u32; 2], kind: Kind| {
                 samples.push(Sample { at, of, next: first[slot], distance: 0.0, kind });
                 first[slot] = (samples.len() - 1) as u32;
@@ -216,7 +217,7 @@ impl<'a> Walk<'a> {
         let mut loose = std::mem::take(&mut self.loose);
         star.clear();
         loose.clear();
-        for h in self.front.middle(self.pm, self.forest, i) {
+        for h in self.front.middle(self.pm, i) {
             self.front.star(h, &mut star);
         }
         for &slot in &star {
@@ -226,9 +227,9 @@ impl<'a> Walk<'a> {
                 s = self.samples[s as usize].next;
             }
         }
-        let beside = self.front.beside(self.pm, self.forest, i);
+        let beside = self.front.beside(self.pm, i);
         self.front.unsplit(self.pm, self.forest, i);
-        let own = self.forest.position(self.pm, self.forest.parent[k], vs as u32) - self.finest.origin;
+        let own = self.forest.place_before(self.pm, vs as u32, i) - self.finest.origin;
         self.positions[vs] = own;
         star.clear();
         if let Some(h) = beside {

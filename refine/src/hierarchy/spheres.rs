@@ -85,8 +85,8 @@ pub(super) fn around(pm: &ProgressiveMesh, forest: &Forest, finest: &Finest, ext
     for i in (0..forest.len() as u32).rev() {
         let k = i as usize;
         let (vs, vu) = (pm.splits.vertex[k], forest.base_vertices + i);
-        let place = |node: u32, v: u32| bounds.place(pm, forest, node, v).as_dvec3();
-        let centre = place(forest.parent[k], vs);
+        let place = |node: u32, v: u32| bounds.local(forest.position(pm, node, v)).as_dvec3();
+        let centre = bounds.place_before(pm, forest, i).as_dvec3();
         let [old, new] = forest.nodes(i);
         let reach = |node: u32, v: u32| centre.distance(place(node, v)) + radius[v as usize];
         let extent = extents.get(k).copied().unwrap_or_default();

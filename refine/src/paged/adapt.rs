@@ -2,11 +2,11 @@
 
 use super::page::APPLIED;
 use super::shelf::Fetch;
-use super::{Open, PagedError, PagedView};
+use super::{PagedError, PagedView};
 use crate::aif::NONE;
 use crate::format::ByteRanges;
 use crate::progressive::Damage;
-use crate::selective::{BETWEEN, Done, LOOKS, Lens, Limits};
+use crate::selective::{Clock, Done, Judges, Lens, Limits, Meter};
 use std::cmp::Reverse;
 
 /// How far a frame may go.
@@ -39,29 +39,13 @@ pub struct PagedDone {
     pub fetched: usize,
 }
 
-/// Needed splits are ordered by how much their errors exceed the tolerance: eight steps for each factor of two.
-const STEPS: f64 = 8.0;
-
-/// What is left of the limits.
-struct Meter<'a> {
-    limits: PagedLimits<'a>,
+/// What a frame did, and what is left of its limits.
+struct Frame<'a> {
+    meter: Meter<'a>,
+    fetches: usize,
     all: PagedDone,
-    since: usize,
-    looks: usize,
-    over: bool,
+    /// Both lists were looked through from their ends, not from where the last frame was cut short.
     whole: bool,
-}
-
-impl Meter<'_> {
-    fn goes_on(&mut self) -> bool {
-        let (done, limits) = (&self.all.done, &self.limits.limits);
-        self.over |= done.splits + done.collapses >= limits.operations;
-        if self.since >= BETWEEN || self.looks >= LOOKS {
-            (self.since, self.looks) = (0, 0);
-            self.over |= limits.expired.is_some_and(|f| f());
-        }
-        !self.over
-    }
 }
 
 /// Where to begin looking through a list of `len`, downwards, and whether that is its end.
@@ -78,107 +62,118 @@ enum Gathered {
 
 impl<S: ByteRanges> PagedView<S> {
     /// Adapts the mesh to what any of the lenses needs, as far as the limits, the memory and the fetches allow: first undoes what is not needed, then applies what is, the
-    /// worst first. Looks at all that is shown; O(valence) for every split applied or undone.
+    /// worst first. Looks at what may have changed since it was looked at last; O(valence) for every split applied or undone.
     ///
     /// Errors: damage, the source's. The mesh is sound then, and closed, somewhere on the way.
     pub fn adapt(&mut self, lenses: &[Lens], limits: &PagedLimits<'_>) -> Result<PagedDone, PagedError> {
-        let mut meter = Meter {
-            limits: *limits,
-            all: PagedDone::default(),
-            since: BETWEEN,
-            looks: 0,
-            over: false,
-            whole: true,
-        };
+        let meter = Meter::new(&limits.limits);
+        let mut frame = Frame { meter, fetches: limits.fetches, all: PagedDone::default(), whole: true };
         self.shelf.clock += 1;
-        self.coarsen(lenses, &mut meter)?;
-        if !meter.over {
-            let result = self.refine(lenses, &mut meter);
+        let judges = Judges::new(lenses, limits.limits.hysteresis);
+        let stands = self.clock.go_on(&judges);
+        // What was not looked at may have become due long ago: times would come round. Errors end frames as well.
+        let cut = std::mem::replace(&mut self.cut, true);
+        let all = cut || !stands;
+        self.coarsen(&judges, all, &mut frame)?;
+        if !frame.meter.over {
+            let result = self.refine(&judges, all, &mut frame);
             self.queue.clear();
             result?;
         }
-        let all = &mut meter.all;
+        self.cut = frame.meter.over || !frame.whole;
+        let all = &mut frame.all;
+        all.done = frame.meter.done;
         let nothing_left = all.done.refused + all.no_room + all.postponed == 0;
-        all.done.complete = !meter.over && meter.whole && nothing_left;
+        all.done.complete = !frame.meter.over && frame.whole && nothing_left;
         Ok(*all)
     }
 
-    fn coarsen(&mut self, lenses: &[Lens], meter: &mut Meter<'_>) -> Result<(), PagedError> {
-        let keep = meter.limits.limits.hysteresis.clamp(1e-6, 1.0);
-        let wants = |o: &Open| lenses.iter().any(|l| l.wants(&o.entry, keep * l.tau()));
+    fn coarsen(&mut self, judges: &Judges<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
         let (mut at, whole) = start(self.resume[0], self.last.len());
         let mut stack = Vec::new();
-        while at > 0 && meter.goes_on() {
+        while at > 0 && frame.meter.goes_on() {
             at = (at - 1).min(self.last.len().saturating_sub(1));
-            meter.looks += 1;
-            let Some(o) = self.last.get(at) else { break };
-            if wants(o) {
+            let Some(o) = self.last.get_mut(at) else { break };
+            if !all && !Clock::has_come(self.clock.now(), o.due) {
+                continue;
+            }
+            frame.meter.looks += 1;
+            let verdict = judges.of_last(&o.entry, &self.clock);
+            if verdict.wanted {
+                o.due = self.clock.due(verdict.slack, o.entry.split);
                 continue;
             }
             stack.push(o.entry.split);
             while let Some(i) = stack.pop() {
                 let place = self.shelf.last_place(i) as usize;
                 let Some(o) = self.last.get(place).filter(|o| o.entry.split == i) else { continue };
-                meter.looks += 1;
-                if wants(o) {
+                frame.meter.looks += 1;
+                if judges.keep(&o.entry) {
                     continue;
                 }
-                if !meter.goes_on() {
+                if !frame.meter.goes_on() {
                     break;
                 }
                 let needs = self.undo(i)?;
-                meter.all.done.collapses += 1;
-                meter.since += 1;
+                frame.meter.done.collapses += 1;
+                frame.meter.since += 1;
                 stack.extend(needs.into_iter().filter(|&d| d != NONE && self.is_free(d)));
             }
         }
         self.resume[0] = at;
-        meter.whole &= whole;
+        frame.whole &= whole;
         Ok(())
     }
 
-    fn refine(&mut self, lenses: &[Lens], meter: &mut Meter<'_>) -> Result<(), PagedError> {
-        let rank = |o: &Open| -> Option<u16> {
-            if !lenses.iter().any(|l| l.wants(&o.entry, l.tau())) {
-                return None;
-            }
-            let urgency = lenses.iter().map(|l| l.urgency(&o.entry)).fold(0.0, f64::max);
-            Some((urgency.max(1.0).log2() * STEPS).min(1e4) as u16)
-        };
+    fn refine(&mut self, judges: &Judges<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
         let (mut at, whole) = start(self.resume[1], self.open.len());
-        while at > 0 && meter.goes_on() {
+        while at > 0 && frame.meter.goes_on() {
             at -= 1;
-            meter.looks += 1;
-            let Some(o) = self.open.get(at) else { break };
-            if let Some(r) = rank(o) {
-                let split = o.entry.split;
-                self.enqueue(r, split, meter);
+            let now = self.clock.now();
+            let Some(o) = self.open.get_mut(at) else { break };
+            if !all && !Clock::has_come(now, o.due) {
+                continue;
             }
+            frame.meter.looks += 1;
+            let verdict = judges.of_next(&o.entry, &self.clock);
+            if !verdict.wanted {
+                o.due = self.clock.due(verdict.slack, o.entry.split);
+                continue;
+            }
+            // Until it is applied.
+            o.due = now;
+            let (split, rank) = (o.entry.split, judges.rank(&o.entry));
+            self.enqueue(rank, split, frame);
         }
         self.resume[1] = at;
-        meter.whole &= whole;
+        frame.whole &= whole;
         while let Some((_, Reverse(i))) = self.queue.pop() {
             if self.shelf.is_applied(i) {
                 continue;
             }
-            if !meter.goes_on() {
+            if !frame.meter.goes_on() {
+                return Ok(());
+            }
+            // Nor is anything fetched for it then.
+            if frame.meter.is_full(self.faces) {
+                frame.meter.done.refused += 1 + self.queue.len();
                 return Ok(());
             }
             let mut closure = std::mem::take(&mut self.closure);
             closure.clear();
-            let gathered = self.gather(i, &mut closure, meter);
+            let gathered = self.gather(i, &mut closure, frame);
             closure.iter().for_each(|&j| self.shelf.mark(j, false));
             // What a split depends on was made before it.
             closure.sort_unstable();
             closure.dedup();
             let applied = gathered.and_then(|g| match g {
-                Gathered::Whole => self.apply_all(&closure, i, meter, &rank),
+                Gathered::Whole => self.apply_all(&closure, i, frame, judges),
                 Gathered::NoRoom => {
-                    meter.all.no_room += 1;
+                    frame.all.no_room += 1;
                     Ok(())
                 }
                 Gathered::Postponed => {
-                    meter.all.postponed += 1;
+                    frame.all.postponed += 1;
                     Ok(())
                 }
             });
@@ -192,36 +187,34 @@ impl<S: ByteRanges> PagedView<S> {
         &mut self,
         closure: &[u32],
         i: u32,
-        meter: &mut Meter<'_>,
-        rank: &impl Fn(&Open) -> Option<u16>,
+        frame: &mut Frame<'_>,
+        judges: &Judges<'_>,
     ) -> Result<(), PagedError> {
         let two = |j: u32| self.shelf.page(j).is_some_and(|(p, k)| p.code[k].two_faces());
         let more: usize = closure.iter().map(|&j| 1 + two(j) as usize).sum();
-        if self.faces + more > meter.limits.limits.faces {
-            meter.all.done.refused += 1;
+        if self.faces + more > frame.meter.limits.faces {
+            frame.meter.done.refused += 1;
             return Ok(());
         }
         if !self.reserve(closure.len()) {
-            meter.all.no_room += 1;
+            frame.all.no_room += 1;
             return Ok(());
         }
         for &j in closure {
-            if !meter.goes_on() {
+            if !frame.meter.goes_on() {
                 return Ok(());
             }
             self.apply(j)?;
-            let done = &mut meter.all.done;
+            let done = &mut frame.meter.done;
             done.splits += 1;
             done.forced += usize::from(j != i);
-            meter.since += 1;
+            frame.meter.since += 1;
             let old = self.shelf.head.base_vertices + 2 * j;
             for k in [old, old + 1] {
                 let place = self.shelf.open_place(k) as usize;
-                if let Some(o) = self.open.get(place).filter(|o| o.node == k)
-                    && let Some(r) = rank(o)
-                {
-                    let next = o.entry.split;
-                    self.enqueue(r, next, meter);
+                if let Some(o) = self.open.get(place).filter(|o| o.node == k && judges.want(&o.entry)) {
+                    let (next, rank) = (o.entry.split, judges.rank(&o.entry));
+                    self.enqueue(rank, next, frame);
                 }
             }
         }
@@ -229,11 +222,11 @@ impl<S: ByteRanges> PagedView<S> {
     }
 
     /// Notes that a split is needed.
-    fn enqueue(&mut self, rank: u16, split: u32, meter: &mut Meter<'_>) {
+    fn enqueue(&mut self, rank: u16, split: u32, frame: &mut Frame<'_>) {
         if self.queue.len() == self.queue.capacity() {
             let more = self.queue.capacity() / 2 + 256;
             if !self.make_room(8 * (self.queue.capacity() + more)) {
-                meter.all.no_room += 1;
+                frame.all.no_room += 1;
                 return;
             }
             self.queue.reserve_exact(more);
@@ -242,20 +235,20 @@ impl<S: ByteRanges> PagedView<S> {
     }
 
     /// Gathers split `i` and all it depends on that is not applied, and fetches their pages.
-    fn gather(&mut self, i: u32, out: &mut Vec<u32>, meter: &mut Meter<'_>) -> Result<Gathered, PagedError> {
+    fn gather(&mut self, i: u32, out: &mut Vec<u32>, frame: &mut Frame<'_>) -> Result<Gathered, PagedError> {
         self.shelf.clock += 1;
         out.push(i);
         let mut k = 0;
         while let Some(&j) = out.get(k) {
             if let Fetch::Missing(most) = self.shelf.ask(j) {
-                if meter.all.fetched >= meter.limits.fetches {
+                if frame.all.fetched >= frame.fetches {
                     return Ok(Gathered::Postponed);
                 }
                 if !self.make_room(most) {
                     return Ok(Gathered::NoRoom);
                 }
                 self.shelf.fetch(j)?;
-                meter.all.fetched += 1;
+                frame.all.fetched += 1;
             }
             self.shelf.mark(j, true);
             let needs = self.shelf.needs(j).ok_or(Damage::Fan(j as usize))?;

@@ -514,16 +514,16 @@ impl<S: ByteRanges> Shelf<S> {
     /// The values of a row, and the channels it has.
     pub(super) fn row(&self, r: RowRef) -> (&[f32], u64) {
         let stride: usize = self.head.channels.iter().flatten().map(|c| c.width).sum();
+        let at = r.row as usize;
         let (rows, present) = match self.pages.get(r.page as usize).and_then(|p| p.as_deref()) {
-            Some(p) => (&p.rows[..], &p.present[..]),
+            Some(p) => (&p.rows[..], p.present.get(at).copied()),
             None => match &self.base.mesh.wedges {
-                Some(w) if r.page == NONE => (&w.rows[..], &w.present[..]),
+                Some(w) if r.page == NONE => (&w.rows[..], w.present.get(at)),
                 _ => return (&[], 0),
             },
         };
-        let at = r.row as usize;
-        match (rows.get(at.saturating_mul(stride)..(at + 1).saturating_mul(stride)), present.get(at)) {
-            (Some(values), Some(&present)) => (values, present),
+        match (rows.get(at.saturating_mul(stride)..(at + 1).saturating_mul(stride)), present) {
+            (Some(values), Some(present)) => (values, present),
             _ => (&[], 0),
         }
     }

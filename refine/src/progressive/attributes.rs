@@ -25,7 +25,7 @@ impl WedgeState {
         WedgeState {
             vertex: streams.base_vertex.clone(),
             rows: streams.rows[..base * streams.stride].to_vec(),
-            present: streams.present[..base].to_vec(),
+            present: streams.present.iter().take(base).collect(),
             undo_rows: Vec::new(),
             undo_present: Vec::new(),
             next_row: base,

@@ -207,6 +207,30 @@ impl Fans {
         }
     }
 
+    /// Tells the wedges in the fan of the vertex that `start` is seen from, each at least once.
+    #[inline]
+    pub(crate) fn each_wedge_around(&self, start: Half, mut tell: impl FnMut(u32)) {
+        let mut last = self.wedge(start);
+        tell(last);
+        // Both ways round, so that a border does not hide a side.
+        for first in [start.turn(), start] {
+            let mut at = first;
+            for _ in 0..self.corners.len() {
+                let Some(h) = self.across(at) else { break };
+                if h.face == start.face {
+                    // All the way round.
+                    return;
+                }
+                let w = self.wedge(h);
+                if w != last {
+                    tell(w);
+                    last = w;
+                }
+                at = h.turn();
+            }
+        }
+    }
+
     /// The wedges in the fan of the vertex that `start` is seen from, each once.
     pub(crate) fn wedges_around(&self, start: Half) -> Vec<u32> {
         let mut found = vec![self.wedge(start)];

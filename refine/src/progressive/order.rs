@@ -120,7 +120,7 @@ impl ProgressiveMesh {
             for &i in order {
                 let r = &rows[i as usize];
                 let range = r.first_row..r.first_row + (r.new + r.changed) as usize;
-                new.present.extend_from_slice(&streams.present[range.clone()]);
+                new.present.extend(range.clone().map(|r| streams.present[r]));
                 new.rows.extend_from_slice(
                     &streams.rows[range.start * streams.stride..range.end * streams.stride],
                 );

@@ -46,7 +46,7 @@ impl<'a> WedgeReplay<'a> {
             channels: wedges.channels().to_vec(),
             stride,
             rows: Vec::with_capacity(rows * stride),
-            present: Vec::with_capacity(rows),
+            present: super::Presence::default(),
             ..Default::default()
         };
         let (mut slot, mut count) = (vec![NONE; wedges.len()], 0);

@@ -1,6 +1,7 @@
 //! From the mesh of the last frame to that of this one.
 
-use super::list::Entry;
+use super::clock::{Clock, Judges, Verdict};
+use super::entry::Entry;
 use super::{Lens, View};
 use crate::aif::NONE;
 
@@ -36,64 +37,37 @@ pub struct Done {
     pub forced: usize,
     /// Nothing was left to do: the mesh is the one the lens asks for.
     pub complete: bool,
-    /// Splits that were needed and would have led beyond the limit of faces.
+    /// Splits that were needed and would have led beyond the limit of faces, or were left when there was no more room.
     pub refused: usize,
 }
 
 /// Operations between two questions for the time.
-pub(crate) const BETWEEN: usize = 64;
+const BETWEEN: usize = 64;
 /// Looks at splits that count as many operations: a look takes about a tenth of an operation's time.
-pub(crate) const LOOKS: usize = 512;
-/// Needed splits lie in buckets by how much their errors exceed the tolerance: eight for each factor of two.
+const LOOKS: usize = 512;
+/// Needed splits lie in buckets by how urgent they are.
 const BUCKETS: usize = 256;
+/// Needed splits that are found too large for the faces left, before a frame gives up: each takes a walk over what it depends on. With 64 the limit of 20,000 faces is used but for 5 at most on dragon.
+const REFUSALS: usize = 64;
 
 /// What is left of the limits.
-struct Meter<'a> {
-    limits: Limits<'a>,
-    done: Done,
-    since: usize,
-    looks: usize,
-    over: bool,
-    /// Both lists were looked through from their ends, not from where the last frame was cut short.
-    whole: bool,
+pub(crate) struct Meter<'a> {
+    pub(crate) limits: Limits<'a>,
+    pub(crate) done: Done,
+    pub(crate) since: usize,
+    pub(crate) looks: usize,
+    pub(crate) over: bool,
 }
 
-/// Entries from which on a list is decided about by several threads: below, handing out the work takes as long.
-#[cfg(feature = "parallel")]
-const MANY: usize = 4096;
-
-/// What `f` says of each entry of a long list, found by several threads, with the split that it is of; nothing of a short one.
-///
-/// The loops that go through a list ask it for what they would have found out themselves, so its being there changes nothing but the time.
-fn ahead<R: Send>(entries: &[Entry], f: impl Fn(&Entry) -> R + Sync + Send) -> Vec<(u32, R)> {
-    #[cfg(feature = "parallel")]
-    if entries.len() >= MANY && rayon::current_num_threads() > 1 {
-        use rayon::prelude::*;
-        return entries.par_iter().with_min_len(MANY / 4).map(|e| (e.split, f(e))).collect();
-    }
-    let _ = (entries, f);
-    Vec::new()
-}
-
-/// What is known ahead of the entry in a place, unless another has come there since.
-fn known<R: Copy>(ahead: &[(u32, R)], at: usize, e: &Entry) -> Option<R> {
-    ahead.get(at).filter(|a| a.0 == e.split).map(|a| a.1)
-}
-
-/// Where to begin looking through a list of `len`, downwards, and whether that is its end.
-fn start(resume: usize, len: usize) -> (usize, bool) {
-    if resume == 0 || resume >= len { (len, true) } else { (resume, false) }
-}
-
-impl Meter<'_> {
-    fn used(&self) -> usize {
-        self.done.splits + self.done.collapses
+impl<'a> Meter<'a> {
+    pub(crate) fn new(limits: &Limits<'a>) -> Self {
+        Meter { limits: *limits, done: Done::default(), since: BETWEEN, looks: 0, over: false }
     }
 
     /// False when it is time to end.
     #[inline]
-    fn goes_on(&mut self) -> bool {
-        if self.used() >= self.limits.operations {
+    pub(crate) fn goes_on(&mut self) -> bool {
+        if self.done.splits + self.done.collapses >= self.limits.operations {
             self.over = true;
         }
         if self.since >= BETWEEN || self.looks >= LOOKS {
@@ -102,83 +76,183 @@ impl Meter<'_> {
         }
         !self.over
     }
+
+    /// Room for faces.
+    fn room(&self, faces: usize) -> usize {
+        self.limits.faces.saturating_sub(faces)
+    }
+
+    /// There is no more room for faces, or enough was tried that it is too little for.
+    pub(crate) fn is_full(&self, faces: usize) -> bool {
+        self.room(faces) == 0 || self.done.refused >= REFUSALS
+    }
 }
+
+/// A record that is due.
+#[derive(Clone, Copy)]
+struct Due {
+    record: u32,
+    /// The split that it is of: it may be used again.
+    made: u32,
+    /// The slack of the decision to keep that split, if that was found.
+    kept: Option<f64>,
+}
+
+/// What was found out about a record ahead: whether to keep its split, if that could be undone, and whether the next is needed.
+#[derive(Clone, Copy)]
+struct Look {
+    keep: Option<Verdict>,
+    next: Option<(u32, Verdict)>,
+}
+
+/// Records from which on threads look ahead: below, handing out the work takes as long.
+#[cfg(feature = "parallel")]
+const MANY: usize = 4096;
 
 impl View {
     /// Adapts the mesh to a lens, as far as the limits allow: first undoes what is not needed, then applies what is, the worst first.
     ///
-    /// O(vertices shown) looks, and O(valence) for every split applied or undone. A frame that a limit cut short is taken up by the next.
+    /// O(valence) for every split applied or undone, looks at those vertices shown of which something may have changed since they were looked at last, and 1 ns or less for each of the
+    /// others. A frame that a limit cut short is taken up by the next.
     pub fn adapt(&mut self, lens: &Lens, limits: &Limits<'_>) -> Done {
         self.adapt_to_all(std::slice::from_ref(lens), limits)
     }
 
     /// As [`View::adapt`], to several lenses: what any of them needs is needed. For a mesh that stands in several places. Without lenses nothing is needed.
     pub fn adapt_to_all(&mut self, lenses: &[Lens], limits: &Limits<'_>) -> Done {
-        let mut meter = Meter {
-            limits: *limits,
-            done: Done::default(),
-            since: BETWEEN,
-            looks: 0,
-            over: false,
-            whole: true,
-        };
+        let mut meter = Meter::new(limits);
+        let judges = Judges::new(lenses, limits.hysteresis);
+        let stands = self.clock.go_on(&judges);
+        let mut due = self.take_due(!stands);
         // First what a limit cut short: else coarsening would undo what is only there for the rest of it, frame after frame.
         if let Some(i) = self.unfinished.take()
-            && self.still_wanted(lenses, i)
+            && !self.front.is_applied(i)
+            && judges.want(&Entry::of(&self.hierarchy, i))
         {
-            self.apply_with_all(i, &mut meter, &mut Vec::new(), |_, _| {});
+            self.apply_with_all(i, &mut meter, &mut Vec::new(), |_| {});
+        }
+        let ahead = self.look_ahead(&due, &judges, limits);
+        self.resume = 0;
+        if !meter.over {
+            self.coarsen(&judges, &mut meter, &mut due, &ahead);
         }
         if !meter.over {
-            self.coarsen(lenses, &mut meter);
+            self.refine(&judges, &mut meter, &due, &ahead);
         }
-        if !meter.over {
-            self.refine(lenses, &mut meter);
-        }
-        meter.done.complete = !meter.over && meter.whole && meter.done.refused == 0;
+        self.front.settle();
+        meter.done.complete = !meter.over && meter.done.refused == 0;
         meter.done
     }
 
+    /// The records that are due, from where the last frame was cut short; all of them if nothing stands. Until they have been looked at they stay due.
+    fn take_due(&mut self, all: bool) -> Vec<Due> {
+        let (now, late) = (self.clock.now(), self.clock.late());
+        let mut due = Vec::new();
+        let mut first = 0;
+        for block in self.front.records.chunks_mut(16) {
+            // Most are not: asked without a branch for each.
+            if all || block.iter().fold(false, |any, r| any | Clock::has_come(now, r.due)) {
+                for (k, r) in (first..).zip(block.iter_mut()) {
+                    if r.is_free() {
+                        r.due = late;
+                    } else if all || Clock::has_come(now, r.due) {
+                        r.due = now;
+                        due.push(Due { record: k, made: r.made, kept: None });
+                    }
+                }
+            }
+            first += 16;
+        }
+        let from = due.partition_point(|d| d.record < self.resume);
+        due.rotate_left(from);
+        due
+    }
+
+    /// What is to be known of all that is due. Who goes through it asks for what would be found out otherwise, so its being there changes nothing but the time: it is found out in one go for all, or by
+    /// several threads. Not where a deadline may come first.
+    fn look_ahead(&self, due: &[Due], judges: &Judges<'_>, limits: &Limits<'_>) -> Vec<Look> {
+        if limits.expired.is_some() && due.len() > LOOKS {
+            return Vec::new();
+        }
+        #[cfg(feature = "parallel")]
+        if due.len() >= MANY && rayon::current_num_threads() > 1 {
+            use rayon::prelude::*;
+            let parts: Vec<Vec<Look>> = due.par_chunks(MANY / 4).map(|d| self.look_at(d, judges)).collect();
+            return parts.concat();
+        }
+        self.look_at(due, judges)
+    }
+
+    /// Each step for all before the next: they wait for memory, and then wait together.
+    fn look_at(&self, due: &[Due], judges: &Judges<'_>) -> Vec<Look> {
+        let h = &*self.hierarchy;
+        let mut keep: Vec<Option<Entry>> = Vec::with_capacity(due.len());
+        let mut next: Vec<Option<Entry>> = Vec::with_capacity(due.len());
+        // Vertices, and how many of their splits are applied.
+        let turns = due.iter().map(|d| {
+            let there = self.front.records[d.record as usize].made == d.made;
+            let v = self.front.vertex_of_record(d.record);
+            there.then(|| (v, self.front.turns(&h.forest, v)))
+        });
+        let turns: Vec<Option<(u32, usize)>> = turns.collect();
+        keep.extend(due.iter().map(|d| self.last(d)));
+        next.extend(turns.iter().map(|t| {
+            let (v, k) = (*t)?;
+            h.forest.chain(v).get(k).map(|&i| Entry::after(h, i, v, k))
+        }));
+        let look = |(keep, next): (Option<Entry>, Option<Entry>)| Look {
+            keep: keep.map(|e| judges.of_last(&e, &self.clock)),
+            next: next.map(|e| (e.split, judges.of_next(&e, &self.clock))),
+        };
+        keep.into_iter().zip(next).map(look).collect()
+    }
+
+    /// The record is still what it was, and nothing depends on its split: that could be undone.
+    fn last(&self, d: &Due) -> Option<Entry> {
+        let r = &self.front.records[d.record as usize];
+        (d.made != NONE && r.made == d.made && r.dependents == 0).then(|| Entry::of(&self.hierarchy, d.made))
+    }
+
     /// Undoes splits that are not needed, until none is left that could be.
-    fn coarsen(&mut self, lenses: &[Lens], meter: &mut Meter<'_>) {
-        let keep = meter.limits.hysteresis.clamp(1e-6, 1.0);
-        let wants = |e: &Entry| lenses.iter().any(|l| l.wants(e, keep * l.tau()));
-        // Downwards: what comes in is put at the end, and looked at as it does.
-        let (mut at, whole) = start(self.resume[0], self.last.entries.len());
+    fn coarsen(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, due: &mut [Due], ahead: &[Look]) {
         let mut stack = Vec::new();
-        let before = ahead(&self.last.entries, wants);
-        while at > 0 && meter.goes_on() {
-            at = (at - 1).min(self.last.entries.len().saturating_sub(1));
+        for (k, d) in due.iter_mut().enumerate() {
+            if !meter.goes_on() {
+                self.resume = d.record;
+                return;
+            }
+            let Some(e) = self.last(d) else { continue };
             meter.looks += 1;
-            let Some(e) = self.last.entries.get(at) else { break };
-            if known(&before, at, e).unwrap_or_else(|| wants(e)) {
+            let known = ahead.get(k).and_then(|a| a.keep);
+            let verdict = known.unwrap_or_else(|| judges.of_last(&e, &self.clock));
+            if verdict.wanted {
+                d.kept = Some(verdict.slack);
                 continue;
             }
-            stack.push(e.split);
-            while let Some(i) = stack.pop() {
-                let place = self.place[i as usize] as usize;
+            stack.push((d.made, true));
+            while let Some((i, sure)) = stack.pop() {
                 // It may have come in twice.
-                let Some(e) = self.last.entries.get(place).filter(|e| e.split == i) else { continue };
-                meter.looks += 1;
-                if wants(e) {
+                if !self.front.is_applied(i) || !self.is_free(i) {
                     continue;
                 }
+                if !sure {
+                    meter.looks += 1;
+                    if judges.keep(&Entry::of(&self.hierarchy, i)) {
+                        continue;
+                    }
+                }
+                // What is left on the stack is due, as it has become free.
                 if !meter.goes_on() {
-                    break;
+                    self.resume = d.record;
+                    return;
                 }
                 self.undo(i);
                 meter.done.collapses += 1;
                 meter.since += 1;
-                let needs = self.hierarchy.forest.needs.of(i).iter().copied();
-                stack.extend(needs.filter(|&d| self.is_free(d)));
+                let needs = self.hierarchy.forest.needs.of(i).iter();
+                stack.extend(needs.filter(|&&n| self.is_free(n)).map(|&n| (n, false)));
             }
         }
-        self.resume[0] = at;
-        meter.whole &= whole;
-    }
-
-    /// Split `i` is not applied, and is needed.
-    fn still_wanted(&self, lenses: &[Lens], i: u32) -> bool {
-        !self.front.is_applied(i) && lenses.iter().any(|l| l.wants(&Entry::of(&self.hierarchy, i), l.tau()))
     }
 
     /// Applies split `i` and all it depends on, and tells what could come next; false if a limit other than that of faces cut it short.
@@ -187,13 +261,15 @@ impl View {
         i: u32,
         meter: &mut Meter<'_>,
         closure: &mut Vec<u32>,
-        mut next: impl FnMut(&View, u32),
+        mut next: impl FnMut(Entry),
     ) -> bool {
         closure.clear();
-        self.closure(i, closure);
-        let code = &self.hierarchy.mesh().splits.code;
-        let more: usize = closure.iter().map(|&j| 1 + code[j as usize].two_faces() as usize).sum();
-        if self.face_count() + more > meter.limits.faces {
+        // A split makes a face at least.
+        let room = meter.room(self.face_count());
+        let fits = self.closure(i, room, closure);
+        let h = self.hierarchy.clone();
+        let faces: usize = closure.iter().map(|&j| 1 + h.forest.two_faces(j) as usize).sum();
+        if !fits || faces > room {
             meter.done.refused += 1;
             return true;
         }
@@ -206,42 +282,61 @@ impl View {
             meter.done.splits += 1;
             meter.since += 1;
             meter.done.forced += usize::from(j != i);
-            for k in self.hierarchy.forest.nodes(j) {
-                let below = self.hierarchy.forest.split_of[k as usize];
-                if below != NONE {
-                    next(self, below);
-                }
+            let old = h.mesh().splits.vertex[j as usize];
+            let chain = h.forest.chain(old);
+            // Mostly the last but few.
+            let turn = chain.iter().rposition(|&k| k <= j).map_or(0, |k| k + 1);
+            let (at, moved) = h.forest.places_after(h.mesh(), j);
+            if let Some(&below) = chain.get(turn) {
+                let at = moved.unwrap_or_else(|| h.forest.place(h.mesh(), old, turn));
+                next(Entry::at(&h, below, at));
+            }
+            if let Some(&below) = h.forest.chain(h.forest.base_vertices + j).first() {
+                next(Entry::at(&h, below, at));
             }
         }
         true
     }
 
     /// Applies splits that are needed, until none is left.
-    fn refine(&mut self, lenses: &[Lens], meter: &mut Meter<'_>) {
-        let wants = |e: &Entry| lenses.iter().any(|l| l.wants(e, l.tau()));
-        let urgency = |e: &Entry| lenses.iter().map(|l| l.urgency(e)).fold(0.0, f64::max);
-        let bucket = |u: f64| ((u.max(1.0).log2() * 8.0) as usize).min(BUCKETS - 1);
-        let mut buckets: Vec<Vec<u32>> = vec![Vec::new(); BUCKETS];
-        let mut highest = 0;
-        let (mut at, whole) = start(self.resume[1], self.open.entries.len());
+    fn refine(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, due: &[Due], ahead: &[Look]) {
         // Buckets matter only if not all will be done.
         let sorted = meter.limits.faces < usize::MAX
             || meter.limits.operations < usize::MAX
             || meter.limits.expired.is_some();
-        let rank = |e: &Entry| if sorted { bucket(urgency(e)) } else { 0 };
-        let needed = |e: &Entry| wants(e).then(|| rank(e));
-        let before = ahead(&self.open.entries, needed);
-        while at > 0 && meter.goes_on() {
-            at -= 1;
+        let rank = |e: &Entry| if sorted { (judges.rank(e) as usize).min(BUCKETS - 1) } else { 0 };
+        let mut buckets: Vec<Vec<u32>> = vec![Vec::new(); if sorted { BUCKETS } else { 1 }];
+        let mut highest = 0;
+        for (k, d) in due.iter().enumerate() {
+            if !meter.goes_on() {
+                self.resume = d.record;
+                return;
+            }
+            let record = self.front.records[d.record as usize];
+            if record.made != d.made {
+                continue;
+            }
+            // What has become free since it was looked at stays due.
+            let kept = match d.kept {
+                _ if d.made == NONE || record.dependents > 0 => f64::INFINITY,
+                Some(slack) => slack,
+                None => 0.0,
+            };
+            let Some(e) = self.open(d.record) else {
+                self.front.records[d.record as usize].due = self.clock.due(kept, d.record);
+                continue;
+            };
             meter.looks += 1;
-            let Some(e) = self.open.entries.get(at) else { break };
-            if let Some(b) = known(&before, at, e).unwrap_or_else(|| needed(e)) {
+            let known = ahead.get(k).and_then(|a| a.next).filter(|n| n.0 == e.split);
+            let verdict = known.map_or_else(|| judges.of_next(&e, &self.clock), |n| n.1);
+            if verdict.wanted {
+                let b = rank(&e);
                 highest = highest.max(b);
                 buckets[b].push(e.split);
+            } else {
+                self.front.records[d.record as usize].due = self.clock.due(kept.min(verdict.slack), d.record);
             }
         }
-        self.resume[1] = at;
-        meter.whole &= whole;
         let mut closure = Vec::new();
         loop {
             let Some(i) = buckets[highest].pop() else {
@@ -254,12 +349,15 @@ impl View {
             if self.front.is_applied(i) {
                 continue;
             }
-            let goes_on = self.apply_with_all(i, meter, &mut closure, |view, next| {
-                let Some(e) = view.open.entries.get(view.place[next as usize] as usize) else { return };
-                if e.split == next && wants(e) {
-                    let b = rank(e);
+            if meter.is_full(self.face_count()) {
+                meter.done.refused += 1 + buckets.iter().map(Vec::len).sum::<usize>();
+                return;
+            }
+            let goes_on = self.apply_with_all(i, meter, &mut closure, |e| {
+                if judges.want(&e) {
+                    let b = rank(&e);
                     highest = highest.max(b);
-                    buckets[b].push(next);
+                    buckets[b].push(e.split);
                 }
             });
             if !goes_on {

@@ -1,25 +1,28 @@
 //! The mesh of a view: faces, links and what is applied; a split and its undoing, in any order that dependencies allow.
 
+use super::index::Index;
+use super::patch::{self, Known, Sheet};
 use crate::aif::NONE;
 use crate::hierarchy::Forest;
-use crate::progressive::{
-    Damage, Explicit, Fans, Half, Opening, ProgressiveMesh, SplitKind, link_faces, seam_wedges,
-};
+use crate::progressive::{Damage, Explicit, Fans, Half, ProgressiveMesh, SplitKind, link_faces};
 
 /// A set of applied splits that is closed under dependencies, and the mesh it makes.
 ///
-/// Faces live in slots of one index buffer; a slot that holds none has three equal corners and is used again.
+/// Every vertex that is there has a *record*: those of the base come first, the others are of the splits that made them, used again when these are undone. A record of a
+/// split has two slots of the index buffer for the faces that it makes; a slot that holds none has three equal corners.
+///
+/// Memory: 48 B of faces and links, 8 B of record and 5 to 7 B of index for a vertex there; for one of the finest mesh a bit, and with attributes 8 B.
 #[derive(Clone, Debug)]
 pub(crate) struct Front {
     fans: Fans,
-    /// The face in every slot; [`NONE`] for none.
-    face_in: Vec<u32>,
-    /// The slot of every face; [`NONE`] where it is not in the mesh.
-    slot_of: Vec<u32>,
-    free: Vec<u32>,
+    base_vertices: u32,
+    base_faces: u32,
+    pub(super) records: Vec<Record>,
+    /// Where splits have their records.
+    index: Index,
+    /// The first record that is free, which tells the next; [`LAST`] for none.
+    free: u32,
     applied: Vec<u64>,
-    /// The node that every vertex is at, among those in the mesh.
-    node: Vec<u32>,
     wedge_vertex: Vec<u32>,
     /// The row of every wedge, among those in the mesh.
     wedge_row: Vec<u32>,
@@ -29,6 +32,41 @@ pub(crate) struct Front {
     pub(super) touched: Vec<u64>,
     /// Wedges that are new, moved, or have other values, maybe repeated.
     pub(super) touched_wedges: Vec<u32>,
+}
+
+/// A vertex that is there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Record {
+    /// The split that made it; [`NONE`] of the base's. Of a record that is free the next, and [`FREE`].
+    pub(super) made: u32,
+    /// Applied splits that depend on that split.
+    pub(super) dependents: u16,
+    /// When to look at it again: see [`super::Clock`].
+    pub(super) due: u16,
+}
+
+/// Set in what free records say that they were made by: splits are fewer.
+const FREE: u32 = 1 << 31;
+/// The end of the free records.
+const LAST: u32 = FREE - 2;
+
+impl Record {
+    pub(super) fn is_free(self) -> bool {
+        self.made & FREE != 0 && self.made != NONE
+    }
+}
+
+/// Splits of a vertex that are looked at one by one.
+const SHORT: usize = 4;
+
+/// What vectors may hold beyond what they need when a frame is over: a part in 32, and so many.
+const SPARE: usize = 64;
+
+fn settle<T>(v: &mut Vec<T>) {
+    let most = v.len() + v.len() / 32 + SPARE;
+    if v.capacity() > most {
+        v.shrink_to(most);
+    }
 }
 
 impl Front {
@@ -53,18 +91,15 @@ impl Front {
             link_faces(&pm.base_faces, n0)
         };
         let m0 = pm.base_faces.len();
-        let mut slot_of: Vec<u32> = (0..m0 as u32).collect();
-        slot_of.resize(pm.faces(), NONE);
-        let mut node: Vec<u32> = (0..n0 as u32).collect();
-        node.resize(n0 + n, NONE);
         debug_assert_eq!(forest.len(), n);
         Front {
             fans: Fans { corners: pm.base_faces.clone(), links },
-            face_in: (0..m0 as u32).collect(),
-            slot_of,
-            free: Vec::new(),
+            base_vertices: n0 as u32,
+            base_faces: m0 as u32,
+            records: vec![Record { made: NONE, dependents: 0, due: 0 }; n0],
+            index: Index::default(),
+            free: LAST,
             applied: vec![0; n.div_ceil(64)],
-            node,
             wedge_vertex,
             wedge_row,
             vertices: n0,
@@ -89,15 +124,57 @@ impl Front {
         &self.fans.corners
     }
 
-    /// The face in every slot; [`NONE`] for none.
-    pub(crate) fn face_in(&self) -> &[u32] {
-        &self.face_in
+    /// The record of vertex `v`, which is in the mesh.
+    #[inline]
+    pub(super) fn record_of_vertex(&self, v: u32) -> u32 {
+        v.checked_sub(self.base_vertices).map_or(v, |i| self.record(i))
     }
 
-    /// The slot of face `f`.
+    /// The record of split `i`; [`NONE`] if it is not applied.
     #[inline]
-    pub(crate) fn slot_of(&self, f: u32) -> u32 {
-        self.slot_of[f as usize]
+    pub(super) fn record(&self, i: u32) -> u32 {
+        self.index.find(i, |r| self.records[r as usize].made)
+    }
+
+    /// The vertex of a record that is not free.
+    #[inline]
+    pub(super) fn vertex_of_record(&self, r: u32) -> u32 {
+        if r < self.base_vertices { r } else { self.base_vertices + self.records[r as usize].made }
+    }
+
+    /// The first slot of a record of a split.
+    #[inline]
+    fn first_slot(&self, r: u32) -> u32 {
+        self.base_faces + 2 * (r - self.base_vertices)
+    }
+
+    /// The record of a slot that is none of the base's.
+    #[inline]
+    fn record_of_slot(&self, slot: u32) -> u32 {
+        self.base_vertices + (slot - self.base_faces) / 2
+    }
+
+    /// The face in a slot; [`NONE`] for none.
+    #[inline]
+    pub(crate) fn face_in(&self, forest: &Forest, slot: u32) -> u32 {
+        let Some(k) = slot.checked_sub(self.base_faces) else { return slot };
+        let Some(record) = self.records.get((self.base_vertices + k / 2) as usize) else { return NONE };
+        if record.is_free() || (k % 2 == 1 && !forest.two_faces(record.made)) {
+            return NONE;
+        }
+        forest.first_face(record.made) + k % 2
+    }
+
+    /// The slot of face `f`; [`NONE`] if it is not in the mesh.
+    #[inline]
+    pub(crate) fn slot_of(&self, forest: &Forest, f: u32) -> u32 {
+        if f < self.base_faces {
+            return f;
+        }
+        match forest.maker_of_face(f).filter(|m| self.is_applied(m.0)) {
+            Some((i, second)) => self.first_slot(self.record(i)) + second as u32,
+            None => NONE,
+        }
     }
 
     /// The face across edge `k` of the face in a slot.
@@ -116,10 +193,26 @@ impl Front {
         &self.applied
     }
 
-    /// The node that vertex `v` is at; [`NONE`] if it is not in the mesh.
+    /// Vertex `v` is in the mesh.
     #[inline]
-    pub(crate) fn node(&self, v: u32) -> u32 {
-        self.node[v as usize]
+    pub(crate) fn has(&self, v: u32) -> bool {
+        v.checked_sub(self.base_vertices).is_none_or(|i| self.is_applied(i))
+    }
+
+    /// How many splits of the chain of vertex `v` are applied: the first ones.
+    #[inline]
+    pub(crate) fn turns(&self, forest: &Forest, v: u32) -> usize {
+        let chain = forest.chain(v);
+        // Short chains from the front: few are longer, and those of the base.
+        match chain.iter().take(SHORT).position(|&j| !self.is_applied(j)) {
+            Some(k) => k,
+            None => chain.partition_point(|&j| self.is_applied(j)),
+        }
+    }
+
+    /// The node that vertex `v` is at; [`NONE`] if it is not in the mesh.
+    pub(crate) fn node(&self, forest: &Forest, v: u32) -> u32 {
+        if self.has(v) { forest.node_after(v, self.turns(forest, v)) } else { NONE }
     }
 
     /// The vertex of wedge `w`, which is in the mesh.
@@ -134,7 +227,8 @@ impl Front {
         self.wedge_row.get(w as usize).copied().unwrap_or(NONE)
     }
 
-    /// Applies split `i`, whose dependencies are applied. `note` is told the row before of every row that changes a wedge. O(valence).
+    /// Applies split `i`, whose dependencies are applied, and returns its record. `note` is told, for every row that changes a wedge, the row that it had before if that is not the
+    /// one that the forest guesses. O(valence).
     ///
     /// Errors: damage; nothing has changed then. Of a hierarchy that was made whole there is none.
     pub(crate) fn split(
@@ -142,170 +236,34 @@ impl Front {
         pm: &ProgressiveMesh,
         forest: &Forest,
         i: u32,
-        mut note: Option<&mut Vec<u32>>,
-    ) -> Result<(), Damage> {
+        note: Option<&mut Vec<[u32; 2]>>,
+    ) -> Result<u32, Damage> {
         let k = i as usize;
-        let (vs, code) = (pm.splits.vertex[k], pm.splits.code[k]);
-        let vu = forest.base_vertices + i;
-        let lost = |to| Damage::Reference { what: "split", at: k, to };
-        let here = |cut: u32| match self.slot_of.get((cut >> 2) as usize) {
-            Some(&s) if s != NONE => Ok(s << 2 | cut & 3),
-            _ => Err(lost(cut)),
+        let (known, explicit) = known(pm, forest, i)?;
+        let here = |cut: u32| match self.slot_of(forest, cut >> 2) {
+            NONE => Err(Damage::Reference { what: "split", at: k, to: cut }),
+            slot => Ok(slot << 2 | cut & 3),
         };
-        let right = if code.two_faces() { here(pm.splits.right[k])? } else { NONE };
-        let gap = self.fans.find_gap(k, (here(pm.splits.left[k])?, right), code)?;
-        let Some(seen_from) = gap.left.inner.or(gap.left.outer) else { return Err(Damage::Fan(k)) };
-        let first = self.fans.wedge(seen_from);
-        if self.wedge_vertex(first) != vs {
-            return Err(Damage::Fan(k));
-        }
-        let rows = forest.rows.get(k).copied().unwrap_or_default();
-        let w = if forest.rows.is_empty() { vu } else { rows.wedge };
-        let tips = [
-            self.fans.tip(gap.left, code.left_tip_inner()),
-            self.fans.tip(gap.right, code.right_tip_inner()),
-        ];
-        let mut explicit = Explicit::default();
-        let (x, new, changed, mut corners): ([u32; 2], u32, &[u32], [[u32; 3]; 2]) = match code.kind() {
-            SplitKind::Plain => ([first; 2], 1, &[first], [[first, w, NONE]; 2]),
-            SplitKind::Seam => {
-                let last = gap.right.inner.map_or(first, |h| self.fans.wedge(h));
-                let outer = |o: Opening| o.outer.map(|h| self.fans.wedge(h));
-                let (l, r) = seam_wedges(first, last, outer(gap.left), outer(gap.right));
-                ([l, r], 2, &[l, r], [[l, w, NONE], [r, w + 1, NONE]])
-            }
-            SplitKind::Explicit => {
-                let Some(s) = &pm.wedges else { return Err(Damage::Fan(k)) };
-                explicit = Explicit::read(&s.explicit, rows.explicit as usize, code.two_faces(), w)
-                    .ok_or(Damage::Wedges(k))?;
-                let of = |k: usize| explicit.corners.get(k).copied().unwrap_or_default();
-                ([first; 2], explicit.new as u32, &explicit.changed, [of(0), of(1)])
-            }
-        };
-        let changed = if code.changes_rows() { changed } else { &[] };
-        if !self.wedge_row.is_empty() {
-            for j in 0..new {
-                self.wedge_vertex[(w + j) as usize] = vu;
-                self.wedge_row[(w + j) as usize] = rows.row + j;
-            }
-            for (row, &c) in (rows.row + new..).zip(changed) {
-                if let Some(note) = note.as_mut() {
-                    note[row as usize] = self.wedge_row[c as usize];
-                }
-                self.wedge_row[c as usize] = row;
-            }
-            if code.kind() == SplitKind::Explicit {
-                let moved = explicit.pairs.iter().filter(|p| p.0 == p.1);
-                moved.for_each(|p| self.wedge_vertex[p.1 as usize] = vu);
-                for (c, tip) in explicit.corners.iter().zip(tips) {
-                    if c[0] >= w {
-                        self.wedge_vertex[c[0] as usize] = vs;
-                    }
-                    if c[2] >= w && c[2] != NONE && tip != NONE {
-                        self.wedge_vertex[c[2] as usize] = self.wedge_vertex[tip as usize];
-                    }
-                }
-            }
-        }
-        self.touched_wedges.extend(w..w + new);
-        self.touched_wedges.extend_from_slice(changed);
-        if code.moves() {
-            self.touch_vertex(vs, seen_from);
-        }
-        match code.kind() {
-            SplitKind::Plain => self.hand_over(gap.left.inner, gap.faces, |_| w),
-            SplitKind::Seam => {
-                self.hand_over(gap.left.inner, gap.faces, |c| if c == x[0] { w } else { w + 1 });
-            }
-            SplitKind::Explicit => {
-                let map = |c: u32| explicit.pairs.iter().find(|p| p.0 == c).map_or(c, |p| p.1);
-                self.hand_over(gap.left.inner, gap.faces, map);
-            }
-        }
-        for (c, tip) in corners.iter_mut().zip(tips).filter(|(c, _)| c[2] == NONE) {
-            c[2] = tip;
-        }
-        let face = forest.first_face(i);
-        let fl = self.take_slot(face);
-        let edge = self.fans.insert_at(fl, code.left(), corners[0], gap.left);
-        if code.two_faces() {
-            let fr = self.take_slot(face + 1);
-            let other = self.fans.insert_at(fr, code.right(), corners[1], gap.right);
-            self.fans.connect(edge, other);
-        }
-        let [old, fresh] = forest.nodes(i);
-        (self.node[vs as usize], self.node[vu as usize]) = (old, fresh);
+        let two = known.code.two_faces();
+        let cuts = (here(pm.splits.left[k])?, if two { here(pm.splits.right[k])? } else { NONE });
+        let [first, _] = patch::split(&mut Whole { front: self, pm, forest, note }, &known, cuts, &explicit)?;
+        self.faces += 1 + two as usize;
         self.vertices += 1;
         self.applied[k / 64] |= 1 << (k % 64);
-        Ok(())
+        Ok(self.record_of_slot(first))
     }
 
     /// Undoes split `i`, which is applied, and on which nothing applied depends. O(valence).
     pub(crate) fn unsplit(&mut self, pm: &ProgressiveMesh, forest: &Forest, i: u32) {
         debug_assert!(self.is_applied(i));
         let k = i as usize;
-        let (vs, code) = (pm.splits.vertex[k], pm.splits.code[k]);
-        let vu = forest.base_vertices + i;
-        let two = code.two_faces();
-        let face = forest.first_face(i);
-        let fl = self.slot_of[face as usize];
-        let fr = if two { self.slot_of[face as usize + 1] } else { fl };
-        let left = self.fans.opening_of(fl, code.left());
-        let right = if two { self.fans.opening_of(fr, code.right()) } else { Opening::default() };
-        let (x_l, y_l) = self.fans.ends_of(fl, code.left());
-        let x_r = if two { self.fans.ends_of(fr, code.right()).0 } else { x_l };
-        let rows = forest.rows.get(k).copied().unwrap_or_default();
-        let explicit = match (code.kind(), &pm.wedges) {
-            (SplitKind::Explicit, Some(s)) => {
-                Explicit::read(&s.explicit, rows.explicit as usize, two, rows.wedge).unwrap_or_default()
-            }
-            _ => Explicit::default(),
-        };
-        // The faces of the new vertex lie between the two that go.
-        let (mut run, mut entry) = (0, left.inner);
-        while let Some(h) = entry.filter(|h| h.face != fl && h.face != fr) {
-            run += 1;
-            entry = self.fans.across(h.turn());
-        }
-        let chosen = [x_l, x_r];
-        let (new, changed): (u32, &[u32]) = match code.kind() {
-            SplitKind::Plain => {
-                self.hand_over(left.inner, run, |_| x_l);
-                (1, &chosen[..1])
-            }
-            SplitKind::Seam => {
-                self.hand_over(left.inner, run, |c| if c == y_l { x_l } else { x_r });
-                (2, &chosen)
-            }
-            SplitKind::Explicit => {
-                let map = |c: u32| explicit.pairs.iter().find(|p| p.1 == c).map_or(c, |p| p.0);
-                self.hand_over(left.inner, run, map);
-                (explicit.new as u32, &explicit.changed)
-            }
-        };
-        self.fans.close(left);
-        self.fans.close(right);
-        self.leave_slot(face, fl);
-        if two {
-            self.leave_slot(face + 1, fr);
-        }
-        let changed = if code.changes_rows() { changed } else { &[] };
-        if !self.wedge_row.is_empty() {
-            let moved = explicit.pairs.iter().filter(|p| p.0 == p.1);
-            moved.for_each(|p| self.wedge_vertex[p.1 as usize] = vs);
-            for (row, &c) in (rows.row + new..).zip(changed) {
-                self.wedge_row[c as usize] = forest.row_before[row as usize];
-            }
-            self.wedge_row[rows.wedge as usize..(rows.wedge + new) as usize].fill(NONE);
-        }
-        self.touched_wedges.extend_from_slice(changed);
-        self.node[vs as usize] = forest.parent[k];
-        self.node[vu as usize] = NONE;
-        if code.moves()
-            && let Some(h) = left.inner.or(left.outer)
-        {
-            self.touch_vertex(vs, h);
-        }
+        // It was read when it was applied.
+        let Ok((known, explicit)) = known(pm, forest, i) else { return };
+        let two = known.code.two_faces();
+        let first = self.first_slot(self.record(i));
+        let slots = [first, first + two as u32];
+        patch::unsplit(&mut Whole { front: self, pm, forest, note: None }, &known, slots, &explicit);
+        self.faces -= 1 + two as usize;
         self.vertices -= 1;
         self.applied[k / 64] &= !(1 << (k % 64));
     }
@@ -334,9 +292,15 @@ impl Front {
     /// The slots of the faces around the vertex of split `i`, whose dependencies are applied: those of the fan that it opens. O(valence).
     ///
     /// Errors: its left cut is not there.
-    pub(crate) fn ring(&self, pm: &ProgressiveMesh, i: u32, out: &mut Vec<u32>) -> Result<(), Damage> {
+    pub(crate) fn ring(
+        &self,
+        pm: &ProgressiveMesh,
+        forest: &Forest,
+        i: u32,
+        out: &mut Vec<u32>,
+    ) -> Result<(), Damage> {
         let cut = pm.splits.left[i as usize];
-        let slot = self.slot_of.get((cut >> 2) as usize).copied().unwrap_or(NONE);
+        let slot = self.slot_of(forest, cut >> 2);
         if slot == NONE || cut & 3 == 3 {
             return Err(Damage::Reference { what: "split", at: i as usize, to: cut });
         }
@@ -346,26 +310,18 @@ impl Front {
     }
 
     /// The edge, seen from the old vertex and from the new one, between the faces that split `i` (applied) has made.
-    pub(crate) fn middle(&self, pm: &ProgressiveMesh, forest: &Forest, i: u32) -> [Half; 2] {
-        let fl = self.slot_of[forest.first_face(i) as usize];
+    pub(crate) fn middle(&self, pm: &ProgressiveMesh, i: u32) -> [Half; 2] {
+        let fl = self.first_slot(self.record(i));
         let (a, vu_next) = pm.splits.code[i as usize].left();
         let edge = (a as u32 + 1) % 3;
         [Half { face: fl, edge, starts: !vu_next }, Half { face: fl, edge, starts: vu_next }]
     }
 
     /// An edge at the old vertex of split `i` (applied) beside its left face, in a face that stays.
-    pub(crate) fn beside(&self, pm: &ProgressiveMesh, forest: &Forest, i: u32) -> Option<Half> {
-        let fl = self.slot_of[forest.first_face(i) as usize];
+    pub(crate) fn beside(&self, pm: &ProgressiveMesh, i: u32) -> Option<Half> {
+        let fl = self.first_slot(self.record(i));
         let at = self.fans.opening_of(fl, pm.splits.code[i as usize].left());
         at.inner.or(at.outer)
-    }
-
-    fn touch_vertex(&mut self, v: u32, h: Half) {
-        if self.wedge_row.is_empty() {
-            self.touched_wedges.push(v);
-        } else {
-            self.touched_wedges.extend(self.fans.wedges_around(h));
-        }
     }
 
     #[inline]
@@ -373,50 +329,174 @@ impl Front {
         self.touched[slot as usize / 64] |= 1 << (slot % 64);
     }
 
+    /// A record for split `i`, with two slots.
     #[inline]
-    fn hand_over(&mut self, first: Option<Half>, count: usize, map: impl Fn(u32) -> u32) {
-        let mut entry = first;
-        for _ in 0..count {
-            let Some(h) = entry else { return };
-            let wedge = &mut self.fans.corners[h.face as usize][h.corner()];
-            *wedge = map(*wedge);
-            self.touch(h.face);
-            entry = self.fans.across(h.turn());
-        }
-    }
-
-    /// A slot for face `f`.
-    #[inline]
-    fn take_slot(&mut self, f: u32) -> u32 {
-        let slot = self.free.pop().unwrap_or_else(|| {
-            self.fans.corners.push([NONE; 3]);
-            self.fans.links.push([NONE; 3]);
-            self.face_in.push(NONE);
-            self.touched.resize(self.fans.corners.len().div_ceil(64), 0);
-            (self.fans.corners.len() - 1) as u32
-        });
-        self.face_in[slot as usize] = f;
-        self.slot_of[f as usize] = slot;
-        self.faces += 1;
-        self.touch(slot);
-        slot
+    fn take_record(&mut self, i: u32) -> u32 {
+        let new = Record { made: i, dependents: 0, due: 0 };
+        let r = if self.free == LAST {
+            self.fans.corners.extend([[0; 3]; 2]);
+            self.fans.links.extend([[NONE; 3]; 2]);
+            let slots = self.fans.corners.len() as u32;
+            self.touched.resize(slots.div_ceil(64) as usize, 0);
+            (slots - 2..slots).for_each(|slot| self.touch(slot));
+            self.records.push(new);
+            self.records.len() as u32 - 1
+        } else {
+            let r = self.free;
+            self.free = self.records[r as usize].made & !FREE;
+            self.records[r as usize] = new;
+            r
+        };
+        let records = &self.records;
+        self.index.insert(i, r, |r| records[r as usize].made);
+        r
     }
 
     #[inline]
-    fn leave_slot(&mut self, f: u32, slot: u32) {
-        self.fans.corners[slot as usize] = [0; 3];
-        self.fans.links[slot as usize] = [NONE; 3];
-        self.face_in[slot as usize] = NONE;
-        self.slot_of[f as usize] = NONE;
-        self.free.push(slot);
-        self.faces -= 1;
-        self.touch(slot);
+    fn leave_record(&mut self, r: u32, i: u32) {
+        let records = &self.records;
+        self.index.remove(i, |r| records[r as usize].made);
+        self.records[r as usize].made = FREE | self.free;
+        self.free = r;
+    }
+
+    /// Gives back what vectors have grown beyond what they need.
+    pub(super) fn settle(&mut self) {
+        settle(&mut self.records);
+        settle(&mut self.fans.corners);
+        settle(&mut self.fans.links);
+        let records = &self.records;
+        self.index.settle(|r| records[r as usize].made);
     }
 
     /// Bytes that grow with the mesh shown, and bytes that each view takes for the whole mesh.
     pub(crate) fn bytes(&self) -> (usize, usize) {
-        let shown = 28 * self.fans.corners.len() + 4 * self.free.len() + 8 * self.touched.len();
-        let tables = self.slot_of.len() + self.node.len() + self.wedge_vertex.len() + self.wedge_row.len();
+        let shown = 12 * (self.fans.corners.capacity() + self.fans.links.capacity())
+            + size_of::<Record>() * self.records.capacity()
+            + self.index.bytes()
+            + 8 * self.touched.capacity()
+            + 4 * self.touched_wedges.capacity();
+        let tables = self.wedge_vertex.len() + self.wedge_row.len();
         (shown, 4 * tables + 8 * self.applied.len())
+    }
+}
+
+/// What is to be known of split `i`, and its entry of the explicit stream.
+#[inline]
+fn known(pm: &ProgressiveMesh, forest: &Forest, i: u32) -> Result<(Known, Explicit), Damage> {
+    let k = i as usize;
+    let (code, new_vertex) = (pm.splits.code[k], forest.base_vertices + i);
+    let rows = forest.rows.as_ref().map(|r| r.of(pm, i));
+    let known = Known {
+        split: i,
+        vertex: pm.splits.vertex[k],
+        new_vertex,
+        code,
+        wedge: rows.map_or(new_vertex, |r| r.wedge),
+        row: rows.map_or(0, |r| r.row),
+    };
+    let explicit = match (code.kind(), &pm.wedges, rows) {
+        (SplitKind::Explicit, Some(s), Some(r)) => {
+            Explicit::read(&s.explicit, r.explicit as usize, code.two_faces(), r.wedge)
+                .ok_or(Damage::Wedges(k))?
+        }
+        (SplitKind::Explicit, ..) => return Err(Damage::Fan(k)),
+        _ => Explicit::default(),
+    };
+    Ok((known, explicit))
+}
+
+/// A front with the mesh that it is of.
+struct Whole<'a, 'n> {
+    front: &'a mut Front,
+    pm: &'a ProgressiveMesh,
+    forest: &'a Forest,
+    note: Option<&'n mut Vec<[u32; 2]>>,
+}
+
+impl Sheet for Whole<'_, '_> {
+    #[inline]
+    fn fans(&self) -> &Fans {
+        &self.front.fans
+    }
+
+    #[inline]
+    fn fans_mut(&mut self) -> &mut Fans {
+        &mut self.front.fans
+    }
+
+    #[inline]
+    fn has_rows(&self) -> bool {
+        self.forest.rows.is_some()
+    }
+
+    #[inline]
+    fn wedge_vertex(&self, w: u32) -> u32 {
+        self.front.wedge_vertex(w)
+    }
+
+    #[inline]
+    fn set_wedge_vertex(&mut self, w: u32, vertex: u32) {
+        self.front.wedge_vertex[w as usize] = vertex;
+    }
+
+    #[inline]
+    fn give_row(&mut self, _: &Known, w: u32, row: u32) {
+        self.front.wedge_row[w as usize] = row;
+    }
+
+    #[inline]
+    fn change_row(&mut self, of: &Known, w: u32, row: u32) {
+        let before = std::mem::replace(&mut self.front.wedge_row[w as usize], row);
+        if let (Some(note), Some(rows)) = (&mut self.note, &self.forest.rows)
+            && rows.guess(self.pm, self.forest, of.split, w) != before
+        {
+            note.push([row, before]);
+        }
+    }
+
+    #[inline]
+    fn restore_row(&mut self, of: &Known, w: u32, row: u32) {
+        let rows = self.forest.rows.as_ref();
+        let before = rows.map_or(NONE, |r| r.before(self.pm, self.forest, (of.split, row), w));
+        self.front.wedge_row[w as usize] = before;
+    }
+
+    #[inline]
+    fn drop_row(&mut self, w: u32) {
+        self.front.wedge_row[w as usize] = NONE;
+    }
+
+    #[inline]
+    fn take_slots(&mut self, of: &Known) -> [u32; 2] {
+        let record = self.front.take_record(of.split);
+        let first = self.front.first_slot(record);
+        [first, first + 1]
+    }
+
+    #[inline]
+    fn leave_slots(&mut self, of: &Known, [first, _]: [u32; 2]) {
+        let record = self.front.record_of_slot(first);
+        self.front.leave_record(record, of.split);
+    }
+
+    #[inline]
+    fn touch(&mut self, slot: u32) {
+        self.front.touch(slot);
+    }
+
+    #[inline]
+    fn touch_wedge(&mut self, w: u32) {
+        self.front.touched_wedges.push(w);
+    }
+
+    #[inline]
+    fn touch_vertex(&mut self, vertex: u32, h: Half) {
+        if self.has_rows() {
+            let Front { fans, touched_wedges, .. } = &mut *self.front;
+            fans.each_wedge_around(h, |w| touched_wedges.push(w));
+        } else {
+            self.front.touched_wedges.push(vertex);
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! What a view needs: which splits may be seen, and how large their errors may look.
 
-use super::list::Entry;
+use super::entry::Entry;
 use crate::hierarchy::{Hierarchy, SplitBounds};
 use crate::view::{Camera, Frustum, Planes};
 use glam::{DMat3, DMat4, DVec3};
@@ -36,21 +36,21 @@ pub enum LensError {
 #[derive(Clone, Copy, Debug)]
 pub struct Lens {
     /// Pixels.
-    tau: f64,
-    frustum: Option<Frustum>,
-    back: bool,
+    pub(super) tau: f64,
+    pub(super) frustum: Option<Frustum>,
+    pub(super) back: bool,
     /// About the origin of the bounds.
-    eye: DVec3,
-    look: DVec3,
+    pub(super) eye: DVec3,
+    pub(super) look: DVec3,
     /// Depth of a point is `gradient . (p - eye)`.
-    gradient: DVec3,
-    steep: f64,
+    pub(super) gradient: DVec3,
+    pub(super) steep: f64,
     /// Pixels at depth 1 of a length of the mesh.
-    lambda: f64,
-    near: f64,
+    pub(super) lambda: f64,
+    pub(super) near: f64,
     /// Of what is in the picture, depth is at least this times the distance from the eye, lengths of the mesh.
-    slant: f64,
-    perspective: bool,
+    pub(super) slant: f64,
+    pub(super) perspective: bool,
 }
 
 impl Lens {
@@ -186,14 +186,26 @@ impl Lens {
         }
         // As `NormalCone::faces_away_from` and `faces_along`: the least dot product of a direction of the cone with the line of sight.
         let (line, reach) = if self.perspective { (centre - self.eye, radius) } else { (self.look, 0.0) };
-        let axis = e.axis.as_dvec3();
-        let along = line.dot(axis);
-        if along <= 0.0 || e.cos <= 0.0 {
-            return true;
-        }
-        let across = (line.length_squared() - along * along).max(0.0).sqrt();
-        along * (e.cos as f64) - across * (e.sin as f64) < reach
+        !faces_away(e, line, reach)
     }
+}
+
+/// How far the least dot product of the line with a direction of the cone is above `reach`; nothing if the cone tells nothing, or looks the other way.
+#[inline]
+pub(super) fn turned(e: &Entry, line: DVec3, reach: f64) -> Option<f64> {
+    let (axis, cos, sin) = e.cone.unpack_parts();
+    let along = line.dot(axis);
+    if along <= 0.0 || cos <= 0.0 {
+        return None;
+    }
+    let across = (line.length_squared() - along * along).max(0.0).sqrt();
+    Some(along * cos - across * sin - reach)
+}
+
+/// Nothing of it shows its front.
+#[inline]
+fn faces_away(e: &Entry, line: DVec3, reach: f64) -> bool {
+    turned(e, line, reach).is_some_and(|above| above >= 0.0)
 }
 
 /// The least and the largest factor by which a matrix stretches, the least from below and the largest from above (by at most 1e-9 of each).

@@ -1,6 +1,6 @@
 //! Geomorphs of a view, without memory of earlier frames.
 
-use super::list::Entry;
+use super::entry::Entry;
 use super::{Lens, View};
 use crate::aif::NONE;
 use glam::DVec3;
@@ -19,7 +19,7 @@ impl View {
     /// As [`View::morphed`], for a mesh that stands in several places: a split has moved as far as the lens that needs it most asks for.
     pub fn morphed_by_all(&self, lenses: &[Lens], v: u32, band: f64) -> Option<DVec3> {
         let h = &*self.hierarchy;
-        let node = Some(self.front.node(v)).filter(|&k| k != NONE)?;
+        let node = Some(self.front.node(&h.forest, v)).filter(|&k| k != NONE)?;
         // From the node upwards to one that has moved wholly; then back down.
         let mut weights = Vec::new();
         let (mut at, mut vertex) = (node, v);
@@ -39,7 +39,7 @@ impl View {
                 break;
             }
             weights.push((h.forest.position(h.mesh(), at, vertex), part));
-            at = h.forest.parent[i as usize];
+            at = h.forest.parent(h.mesh(), i);
             vertex = h.mesh().splits.vertex[i as usize];
         }
         let start = h.forest.position(h.mesh(), at, vertex);

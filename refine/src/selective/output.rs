@@ -14,12 +14,18 @@ impl View {
 
     /// The face of the progressive mesh in a slot of the index buffer; none in one that is free, or is not there.
     pub fn face_in(&self, slot: usize) -> Option<u32> {
-        self.front.face_in().get(slot).copied().filter(|&f| f != NONE)
+        let there = u32::try_from(slot).ok().filter(|_| slot < self.front.corners().len())?;
+        Some(self.front.face_in(&self.hierarchy.forest, there)).filter(|&f| f != NONE)
     }
 
     /// The slot of the index buffer that holds face `f` of the progressive mesh; `None` if it is not shown. Panics if there is no such face.
     pub fn slot_of(&self, f: u32) -> Option<usize> {
-        Some(self.front.slot_of(f)).filter(|&s| s != NONE).map(|s| s as usize)
+        assert!(
+            (f as usize) < self.hierarchy.forest.faces(),
+            "face {f} of {}",
+            self.hierarchy.forest.faces()
+        );
+        Some(self.front.slot_of(&self.hierarchy.forest, f)).filter(|&s| s != NONE).map(|s| s as usize)
     }
 
     /// The slots of the faces across the three edges of the face in a slot, edge `k` from corner `k` to corner `k + 1`; `None` at borders and at edges of three and more
@@ -35,8 +41,8 @@ impl View {
 
     /// Where vertex `v` stands, model units; `None` if it is not shown. Panics if there is no such vertex.
     pub fn position(&self, v: u32) -> Option<DVec3> {
-        let node = Some(self.front.node(v)).filter(|&k| k != NONE)?;
-        Some(self.hierarchy.forest.position(self.hierarchy.mesh(), node, v))
+        let h = &*self.hierarchy;
+        self.front.has(v).then(|| h.forest.place(h.mesh(), v, self.front.turns(&h.forest, v)))
     }
 
     /// The attribute values of a wedge, and the channels it has; empty if it is not shown, or without attributes.
@@ -54,7 +60,7 @@ impl View {
     /// then, unless `places` is empty. O(n).
     pub fn to_input_with(&self, places: &[(u32, DVec3)]) -> MeshInput {
         let mut out = self.input(places.is_empty());
-        let shown = (0..self.hierarchy.mesh().vertices() as u32).filter(|&v| self.front.node(v) != NONE);
+        let shown = (0..self.hierarchy.mesh().vertices() as u32).filter(|&v| self.front.has(v));
         let mut next = places.iter().peekable();
         for (k, v) in shown.enumerate() {
             while next.next_if(|p| p.0 < v).is_some() {}
@@ -98,18 +104,16 @@ impl View {
         let mut vertex = vec![NONE; pm.vertices()];
         let mut count = 0;
         for (v, new) in vertex.iter_mut().enumerate() {
-            let node = self.front.node(v as u32);
-            if node != NONE {
-                forest.append_position(pm, node, &mut out.positions);
+            let v = v as u32;
+            if self.front.has(v) {
+                forest.append_place(pm, v, self.front.turns(forest, v), &mut out.positions);
                 *new = count;
                 count += 1;
             }
         }
-        let mut slots: Vec<(u32, u32)> = (0u32..)
-            .zip(self.front.face_in())
-            .filter(|(_, f)| **f != NONE)
-            .map(|(slot, &f)| (f, slot))
-            .collect();
+        let slots = 0..self.front.corners().len() as u32;
+        let mut slots: Vec<(u32, u32)> =
+            slots.map(|slot| (self.front.face_in(forest, slot), slot)).filter(|s| s.0 != NONE).collect();
         slots.sort_unstable();
         let corners = || slots.iter().flat_map(|&(_, s)| self.front.corners()[s as usize]);
         out.corners = corners().map(|w| vertex[self.front.wedge_vertex(w) as usize]).collect();

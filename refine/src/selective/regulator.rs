@@ -1,5 +1,7 @@
 //! A tolerance that follows a budget of faces (Hoppe 1997).
 
+use super::Done;
+
 /// Finds, from frame to frame, the tolerance at which a view has about as many faces as wanted.
 ///
 /// `tau *= (faces / goal) ^ gain` after each frame, but not while the count is within a dead band about the goal, and never beyond its bounds: where the scene has no
@@ -32,15 +34,15 @@ impl Regulator {
         self.tau
     }
 
-    /// Takes note of a frame: how many faces it had, and whether it was all that the tolerance asks for (else it would have had more).
-    pub fn note(&mut self, faces: usize, complete: bool) {
-        let ratio = faces as f64 / self.goal;
-        if (ratio - 1.0).abs() <= DEAD_BAND && complete {
+    /// Takes note of a frame: how many faces it had, and what it did. One that was cut short would have had more.
+    pub fn note(&mut self, faces: usize, done: &Done) {
+        // Splits that were needed make two faces each, at least: what they depend on, and what comes after them, is not known.
+        let ratio = (faces + 2 * done.refused) as f64 / self.goal;
+        if (ratio - 1.0).abs() <= DEAD_BAND && done.complete {
             return;
         }
         let factor = ratio.max(1.0 / 16.0).powf(GAIN).clamp(1.0 / STEP, STEP);
-        // A frame cut short says how many faces fit, not how many are wanted.
-        let factor = if complete { factor } else { factor.max(1.02) };
+        let factor = if done.complete { factor } else { factor.max(1.02) };
         self.tau = (self.tau * factor).clamp(self.bounds[0], self.bounds[1]);
     }
 }
@@ -49,14 +51,28 @@ impl Regulator {
 mod tests {
     use super::*;
 
+    /// What a frame does that is to show so many faces, of 20,000 at most; of splits that are refused it meets every tenth.
+    fn note(r: &mut Regulator, wanted: f64) {
+        let refused = (wanted as usize).saturating_sub(20_000) / 20;
+        let done = Done { complete: wanted <= 20_000.0, refused, ..Done::default() };
+        r.note((wanted as usize).min(20_000), &done);
+    }
+
     /// A scene that shows `many / tau` faces.
     fn settle(many: f64, frames: usize) -> Regulator {
         let mut r = Regulator::new(20_000, 1.0);
         for _ in 0..frames {
-            let wanted = (many / r.tau()) as usize;
-            r.note(wanted.min(20_000), wanted <= 20_000);
+            let wanted = many / r.tau();
+            note(&mut r, wanted);
         }
         r
+    }
+
+    #[test]
+    fn far_above_the_budget_it_hurries() {
+        // Told only that frames are not complete it would take over a hundred.
+        let faces = 4e5 / settle(4e5, 40).tau();
+        assert!(faces <= 20_000.0, "{faces}");
     }
 
     #[test]
@@ -72,11 +88,11 @@ mod tests {
     #[test]
     fn a_poor_scene_does_not_wind_it_up() {
         let mut r = Regulator::new(20_000, 1.0);
-        (0..500).for_each(|_| r.note(100, true));
+        (0..500).for_each(|_| note(&mut r, 100.0));
         assert_eq!(r.tau(), 1.0);
         (0..60).for_each(|_| {
             let wanted = 60_000.0 / r.tau();
-            r.note(wanted.min(20_000.0) as usize, wanted <= 20_000.0);
+            note(&mut r, wanted);
         });
         assert!(60_000.0 / r.tau() <= 20_000.0);
     }

@@ -1,6 +1,6 @@
 //! Geomorphs by time: a view that follows another, its vertices moving for a number of frames (Hoppe 1997).
 
-use super::list::Entry;
+use super::entry::Entry;
 use super::{Lens, View};
 use crate::aif::NONE;
 use glam::DVec3;
@@ -130,7 +130,8 @@ impl TimedMorph {
             }
         }
         // At rest, and no more of it to be undone: in its own place.
-        let own = |v: u32| self.drawn.front.node(v) == leader.front.node(v);
+        let forest = &leader.hierarchy.forest;
+        let own = |v: u32| self.drawn.front.node(forest, v) == leader.front.node(forest, v);
         self.motions.retain(|&v, m| m.step < frames || !own(v));
         done.morphing = self.motions.values().filter(|m| m.step < frames).count();
         done
@@ -150,12 +151,12 @@ impl TimedMorph {
         for &i in splits {
             let e = Entry::of(h, i);
             let seen = lenses.iter().any(|l| l.sees(&e, e.centre.as_dvec3(), e.radius as f64));
-            stack.push((h.forest.parent[i as usize], self.ends(i)[0]));
-            while let Some((node, v)) = stack.pop() {
-                let next = h.forest.split_of[node as usize];
+            // Vertices, and the splits that may come next at them.
+            stack.push((self.ends(i)[0], i));
+            while let Some((v, next)) = stack.pop() {
                 if next != NONE && self.drawn.front.is_applied(next) {
-                    let [old, new] = h.forest.nodes(next);
-                    stack.extend([(old, v), (new, self.ends(next)[1])]);
+                    let [old, new] = h.forest.below(h.mesh(), next);
+                    stack.extend([(v, old), (self.ends(next)[1], new)]);
                 } else {
                     *out.entry(v).or_insert(false) |= seen;
                 }
@@ -168,13 +169,13 @@ impl TimedMorph {
     fn send(&mut self, v: u32, seen: bool, leader: &View) {
         let h = self.drawn.hierarchy.clone();
         let Some(at) = self.position(v) else { return };
-        let (mut node, mut vertex) = (self.drawn.front.node(v), v);
-        while leader.front.node(vertex) != node {
+        let (mut node, mut vertex) = (self.drawn.front.node(&h.forest, v), v);
+        while leader.front.node(&h.forest, vertex) != node {
             let i = h.forest.maker(node);
             if i == NONE {
                 break;
             }
-            (node, vertex) = (h.forest.parent[i as usize], h.mesh().splits.vertex[i as usize]);
+            (node, vertex) = (h.forest.parent(h.mesh(), i), h.mesh().splits.vertex[i as usize]);
         }
         let to = h.forest.position(h.mesh(), node, vertex);
         let m = self.motions.entry(v).or_insert(Motion { from: at, to: at, at, step: self.frames });

@@ -58,7 +58,7 @@ pub(super) fn fly(
         let done = done.map_err(|e| Failure::Input(format!("{file}: {e}")))?;
         let us = start.elapsed().as_secs_f64() * 1e6;
         if let Some(r) = &mut regulator {
-            r.note(scene.needed_faces(), done.complete);
+            r.note(scene.needed_faces(), &done);
         }
         let changes = scene.take_changes();
         watch(&Step { number, camera, scene, done, changes: &changes, tau, us })?;

@@ -86,7 +86,7 @@ impl Args {
             let us = start.elapsed().as_secs_f64() * 1e6;
             *most = scene.bytes().max(*most);
             if let Some(r) = &mut regulator {
-                r.note(scene.face_count(), done.done.complete);
+                r.note(scene.face_count(), &done.done);
             }
             let (dirty_index_bytes, dirty_wedges) = scene.take_changes();
             frames.push(Frame {

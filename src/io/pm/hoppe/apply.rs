@@ -4,7 +4,7 @@ use super::read::{Head, Reader, Record, wrong};
 use crate::aif::{Channel, NONE};
 use crate::io::DecodeError;
 use crate::refine::ProgressiveMesh;
-use crate::refine::progressive::{SplitCode, SplitKind, SplitParts, WedgeStreams};
+use crate::refine::progressive::{Presence, SplitCode, SplitKind, SplitParts, WedgeStreams};
 use std::collections::HashMap;
 
 type Broken = &'static str;
@@ -104,7 +104,7 @@ impl Builder {
             stride,
             base_vertex: b.wedge_vertex.clone(),
             rows: b.rows.clone(),
-            present: vec![b.all(); wedges],
+            present: Presence::all(b.all(), wedges),
             ..Default::default()
         };
         Ok(b)
@@ -117,7 +117,7 @@ impl Builder {
 
     pub(super) fn finish(mut self, channels: Vec<Channel>) -> ProgressiveMesh {
         let all = (1u64 << channels.len()) - 1;
-        self.streams.present.iter_mut().for_each(|p| *p = all);
+        self.streams.present = Presence::all(all, self.streams.present.len());
         self.streams.channels = channels;
         self.out.wedges = Some(self.streams);
         self.out.face_material = self.face_material;

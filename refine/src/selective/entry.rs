@@ -1,0 +1,38 @@
+//! A split with what is needed to decide about it.
+
+use crate::hierarchy::{Cone, Hierarchy, Packed, unpack};
+use glam::Vec3;
+
+/// A split and its bounds, ready to be decided about, 28 B.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entry {
+    pub(super) centre: Vec3,
+    pub(super) radius: f32,
+    pub(super) error: f32,
+    pub(crate) split: u32,
+    pub(super) cone: Cone,
+}
+
+impl Entry {
+    pub(super) fn of(h: &Hierarchy, i: u32) -> Entry {
+        Entry::new(i, h.local_centre(i), h.bounds.of[i as usize])
+    }
+
+    /// Of the split of vertex `v` that comes after the first `k` of its chain, and is `i`.
+    #[inline]
+    pub(super) fn after(h: &Hierarchy, i: u32, v: u32, k: usize) -> Entry {
+        Entry::at(h, i, h.forest.place(h.mesh(), v, k))
+    }
+
+    /// Of split `i`, of a vertex that stands there.
+    #[inline]
+    pub(super) fn at(h: &Hierarchy, i: u32, place: glam::DVec3) -> Entry {
+        Entry::new(i, h.bounds.local(place), h.bounds.of[i as usize])
+    }
+
+    /// Of a split at `centre`, about the origin of the bounds.
+    #[inline]
+    pub(crate) fn new(split: u32, centre: Vec3, b: Packed) -> Entry {
+        Entry { centre, radius: unpack(b.radius), error: unpack(b.error), split, cone: b.cone }
+    }
+}
