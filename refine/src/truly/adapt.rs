@@ -2,7 +2,7 @@
 
 use super::{TrulyView, entry, guard};
 use crate::aif::NONE;
-use crate::selective::{BETWEEN, Done, Entry, LOOKS, Lens, Limits};
+use crate::selective::{Done, Entry, Lens, Limits, Meter};
 use std::collections::BinaryHeap;
 
 /// What the flip guard did in a frame.
@@ -19,27 +19,6 @@ pub struct Guarded {
 /// Attempts to turn back what a split turned.
 const TURNS: usize = 32;
 
-/// What is left of the limits.
-struct Meter<'a> {
-    limits: Limits<'a>,
-    done: Done,
-    since: usize,
-    looks: usize,
-    over: bool,
-}
-
-impl Meter<'_> {
-    /// False when it is time to end.
-    fn goes_on(&mut self) -> bool {
-        self.over |= self.done.splits + self.done.collapses >= self.limits.operations;
-        if self.since >= BETWEEN || self.looks >= LOOKS {
-            (self.since, self.looks) = (0, 0);
-            self.over |= self.limits.expired.is_some_and(|f| f());
-        }
-        !self.over
-    }
-}
-
 impl TrulyView {
     /// Adapts the mesh to a lens, as far as the limits allow: first undoes what is not needed, then applies what is, the worst first.
     ///
@@ -52,8 +31,7 @@ impl TrulyView {
     pub fn adapt_to_all(&mut self, lenses: &[Lens], limits: &Limits<'_>) -> Done {
         self.guarded = Guarded::default();
         let guard = self.guard && lenses.iter().any(|l| l.tau().is_finite());
-        let mut meter =
-            Meter { limits: *limits, done: Done::default(), since: BETWEEN, looks: 0, over: false };
+        let mut meter = Meter::new(limits);
         // First what a limit cut short, so that coarsening does not undo what is only there for the rest of it.
         if let Some(i) = self.unfinished.take()
             && !self.mesh.is_applied(i)

@@ -59,7 +59,7 @@ impl Args {
             let us = start.elapsed().as_secs_f64() * 1e6;
             guard.note(truly.guarded());
             if let Some(r) = &mut regulator {
-                r.note(truly.face_count(), done.complete);
+                r.note(truly.face_count(), &done);
             }
             let (dirty_index_bytes, dirty_wedges) = truly.take_changes();
             let due = self.measure_every.is_some_and(|n| number.is_multiple_of(n));
