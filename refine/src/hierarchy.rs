@@ -20,7 +20,7 @@ mod settled;
 mod spheres;
 
 pub use bounds::{Bounds, Guarantee, SplitBounds};
-pub(crate) use bounds::{Packed, unpack};
+pub(crate) use bounds::{Packed, pack_up, unpack};
 pub(crate) use cone::Cone;
 pub(crate) use forest::{Forest, SplitRows};
 
