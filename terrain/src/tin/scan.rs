@@ -20,7 +20,18 @@ pub(crate) fn area(a: (i32, i32), b: (i32, i32), c: (i32, i32)) -> i64 {
 
 /// Calls `f(y, x0, x1)` for every row of samples in the triangle, borders included. No division but one for each side.
 #[inline(always)]
-pub(crate) fn rows(a: (i32, i32), b: (i32, i32), c: (i32, i32), mut f: impl FnMut(i32, i32, i32)) {
+pub(crate) fn rows(a: (i32, i32), b: (i32, i32), c: (i32, i32), f: impl FnMut(i32, i32, i32)) {
+    rows_with(true, a, b, c, f);
+}
+
+/// The same without the rows in which there is but a corner.
+#[inline(always)]
+pub(crate) fn rows_between(a: (i32, i32), b: (i32, i32), c: (i32, i32), f: impl FnMut(i32, i32, i32)) {
+    rows_with(false, a, b, c, f);
+}
+
+#[inline(always)]
+fn rows_with(corners: bool, a: (i32, i32), b: (i32, i32), c: (i32, i32), mut f: impl FnMut(i32, i32, i32)) {
     let mut v = [a, b, c];
     if v[0].1 > v[1].1 {
         v.swap(0, 1);
@@ -39,7 +50,13 @@ pub(crate) fn rows(a: (i32, i32), b: (i32, i32), c: (i32, i32), mut f: impl FnMu
     let mut long = Side::new(low, high);
     if low.1 < mid.1 {
         let mut short = Side::new(low, mid);
-        for y in low.1..mid.1 {
+        let mut first = low.1;
+        if !corners {
+            first += 1;
+            long.step();
+            short.step();
+        }
+        for y in first..mid.1 {
             let (l, r) = if long_is_left { (&long, &short) } else { (&short, &long) };
             if l.ceil() <= r.floor() {
                 f(y, l.ceil(), r.floor());
@@ -53,7 +70,7 @@ pub(crate) fn rows(a: (i32, i32), b: (i32, i32), c: (i32, i32), mut f: impl FnMu
         return f(mid.1, l, r);
     }
     let mut short = Side::new(mid, high);
-    for y in mid.1..=high.1 {
+    for y in mid.1..high.1 + i32::from(corners) {
         let (l, r) = if long_is_left { (&long, &short) } else { (&short, &long) };
         if l.ceil() <= r.floor() {
             f(y, l.ceil(), r.floor());
@@ -301,7 +318,13 @@ mod tests {
             rows(a, b, c, |y, x0, x1| seen.extend((x0..=x1).map(|x| (x, y))));
             let inside = |p| area(a, b, p) >= 0 && area(b, c, p) >= 0 && area(c, a, p) >= 0;
             let all: Vec<_> = (0..13).flat_map(|y| (0..13).map(move |x| (x, y))).filter(|&p| inside(p)).collect();
-            prop_assert_eq!(seen, all);
+            prop_assert_eq!(&seen, &all);
+            // All but corners, too.
+            let mut between = vec![];
+            rows_between(a, b, c, |y, x0, x1| between.extend((x0..=x1).map(|x| (x, y))));
+            prop_assert!(between.iter().all(|p| all.contains(p)));
+            let corner = |p: &(i32, i32)| [a, b, c].contains(p);
+            prop_assert!(all.iter().all(|p| corner(p) || between.contains(p)));
         }
     }
 }
