@@ -1,21 +1,22 @@
 //! Progressive terrain: the block hierarchy of a height grid ([`crate::terrain::block`]) as a progressive mesh.
 //!
 //! Blocks are made level by level, those of a level side by side; each goes to a [`Store`] when it is done, from where the next level takes what is left of it, and
-//! an interrupted run what it had done. At the end all collapses, the last first, are numbered as splits.
-//!
-//! What such a mesh takes to be numbered and written is in memory at once; blocks are not.
+//! an interrupted run what it had done. At the end the collapses of each block, the last first, become splits: from the root down ([`Blocks::code`]), with no more in memory than the blocks
+//! on the way to one of the finest.
 //!
 //! The mesh has x = column, and y = height and z = row in the length of a step by a column; faces look up.
 
+mod code;
 mod number;
 mod store;
 
+pub use code::Coded;
 pub use store::{InMemory, Store};
 
 use crate::refine::ProgressiveMesh;
-use crate::terrain::block::{Block, BlockError, Layout, Relief, Sheet, join, leaf};
-use crate::terrain::{Raster, RasterError};
-use number::Assembly;
+use crate::terrain::block::{Block, BlockError, BlockHead, Layout, Relief, Sheet, join, leaf};
+use crate::terrain::{Raster, RasterError, Window, windows};
+use number::{Assembly, Frame, MOST_FACES, Numbers};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// How a progressive terrain is made. Start from `Options::default()` and set what differs.
@@ -26,7 +27,7 @@ pub struct Options {
     pub floor: f64,
     /// Steps along a side of a block of the finest level. Larger ones lock fewer vertices, but take more memory.
     pub cells: usize,
-    /// About how many bytes of heights and blocks to hold at once. Above 16 of it a block has as many heights, it is measured against the least and greatest of squares of them,
+    /// About how many bytes of heights and blocks to hold at once. Where a block has more heights than a 32nd of it, it is measured against the least and greatest of squares of them,
     /// which makes bounds of the coarsest blocks a little larger.
     pub memory: usize,
     /// Lengths of a step by a column and by a row, in the unit of heights.
@@ -75,7 +76,7 @@ impl Options {
 
     /// Heights, or cells of them, that one block is measured against.
     fn most_heights(&self) -> usize {
-        (self.memory / 16).max(1 << 12)
+        (self.memory / 32).max(1 << 12)
     }
 }
 
@@ -113,6 +114,9 @@ pub enum BuildError {
     /// What was put aside could not be written or read.
     #[error("the work folder: {0}")]
     Store(#[from] std::io::Error),
+    /// The file could not be written.
+    #[error("{0}")]
+    Write(std::io::Error),
     /// More triangles than a progressive mesh can number.
     #[error(
         "{0} triangles are more than a progressive mesh can number (2^29); a larger --floor leaves fewer"
@@ -147,9 +151,41 @@ pub struct Built {
     pub found: usize,
 }
 
-/// Builds a progressive terrain. The same for any number of threads, and whatever the store has already of the same grid and options.
-///
-/// O(samples log samples). Memory: about [`Options::memory`], and that of the mesh at the end.
+/// What a terrain is made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Figures {
+    /// [`Options::spacing`].
+    pub spacing: [f64; 2],
+    /// The greatest difference of height between a sample and full detail, in the unit of heights.
+    pub error: f64,
+    /// Levels of blocks.
+    pub levels: u32,
+    /// Blocks of all levels.
+    pub blocks: usize,
+    /// Those of them that the store had already.
+    pub found: usize,
+    /// Triangles of the base.
+    pub base_triangles: usize,
+    /// Triangles at full detail.
+    pub triangles: usize,
+    /// Vertices at full detail.
+    pub vertices: usize,
+    /// Splits.
+    pub splits: usize,
+}
+
+/// The blocks of a terrain, all made: in the store.
+pub struct Blocks<'a> {
+    work: Work<'a>,
+    /// Of every level, the finest first, and its blocks in rows.
+    heads: Vec<Vec<BlockHead>>,
+    root: Sheet,
+    frame: Frame,
+    figures: Figures,
+}
+
+/// Builds a progressive terrain in memory: [`blocks`], and then all their collapses numbered as one mesh, which takes some 350 B a vertex. [`Blocks::code`] writes without.
 ///
 /// # Errors
 /// [`BuildError`].
@@ -159,6 +195,23 @@ pub fn build(
     store: &dyn Store,
     control: &dyn Control,
 ) -> Result<Built, BuildError> {
+    let blocks = blocks(raster, options, store, control)?;
+    let Figures { spacing, error, levels, blocks: count, found, .. } = blocks.figures;
+    Ok(Built { mesh: blocks.mesh()?, spacing, error, levels, blocks: count, found })
+}
+
+/// Makes the blocks of a progressive terrain. The same for any number of threads, and whatever the store has already of the same grid and options.
+///
+/// O(samples log samples). Memory: about [`Options::memory`].
+///
+/// # Errors
+/// [`BuildError`].
+pub fn blocks<'a>(
+    raster: &'a dyn Raster,
+    options: &'a Options,
+    store: &'a dyn Store,
+    control: &'a dyn Control,
+) -> Result<Blocks<'a>, BuildError> {
     let (columns, rows, cells) = (raster.columns(), raster.rows(), options.cells);
     let layout = Layout::new(columns, rows, cells).ok_or(BuildError::Layout { columns, rows, cells })?;
     if !(options.floor >= 0.0 && options.floor.is_finite()) {
@@ -168,41 +221,102 @@ pub fn build(
     if !scale.into_iter().all(|s| (1e-12..1e12).contains(&s)) {
         return Err(BuildError::Spacing);
     }
-    let layout = layout.with_scale(scale);
+    let frame = Frame::new(scale, greatest(raster, control)?);
+    let layout = layout.with_scale(scale).with_slack(frame.slack(columns, rows));
     let levels = layout.levels();
     let total: usize = (0..levels).map(|l| layout.blocks(l).iter().product::<usize>()).sum();
     let work = Work { raster, layout, options, store, control };
     let (done, found) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let mut heads: Vec<Vec<BlockHead>> = vec![];
     for level in 0..levels {
-        let [across, down] = layout.blocks(level);
-        let all: Vec<[usize; 2]> = (0..down).flat_map(|y| (0..across).map(move |x| [x, y])).collect();
-        for group in all.chunks(work.at_once(level)) {
+        let all = in_rows(&layout, level);
+        let mut of_level = Vec::with_capacity(all.len());
+        // Blocks beside each other take no more memory than there are threads.
+        let side_by_side = work.at_once(level);
+        let group = if side_by_side >= threads() { all.len() } else { side_by_side };
+        for group in all.chunks(group.max(1)) {
             let one = |at: &[usize; 2]| {
                 if control.cancelled() {
                     return Err(BuildError::Cancelled);
                 }
-                found.fetch_add(usize::from(work.make(level, *at)?), Ordering::Relaxed);
+                let (head, known) = work.make(level, *at)?;
+                found.fetch_add(usize::from(known), Ordering::Relaxed);
                 // Each level has as many samples to look at as the first, but far fewer vertices.
                 let count = done.fetch_add(1, Ordering::Relaxed) + 1;
-                control.progress(0.9 * count as f64 / total as f64);
-                Ok(())
+                control.progress(0.8 * count as f64 / total as f64);
+                Ok(head)
             };
-            each(group, one)?;
+            of_level.extend(each(group, one)?);
         }
+        heads.push(of_level);
     }
-    work.number(levels, total, found.into_inner())
+    let root = work.sheet(levels - 1, [0, 0])?;
+    if root.faces.is_empty() {
+        return Err(BuildError::Nothing);
+    }
+    let all = || heads.iter().flatten();
+    let (base_triangles, splits) = (root.faces.len(), all().map(|h| h.collapses as usize).sum::<usize>());
+    let new: u64 = all().map(|h| u64::from(h.faces - h.faces_left)).sum();
+    let triangles = base_triangles as u64 + new;
+    if triangles >= MOST_FACES {
+        return Err(BuildError::TooLarge(triangles));
+    }
+    let spacing = options.spacing;
+    let figures = Figures {
+        spacing,
+        error: all().map(|h| h.error).fold(0.0, f64::max) + frame.rounding() * spacing[0],
+        levels,
+        blocks: total,
+        found: found.into_inner(),
+        base_triangles,
+        triangles: triangles as usize,
+        vertices: root.vertices.len() + splits,
+        splits,
+    };
+    Ok(Blocks { work, heads, root, frame, figures })
 }
 
-/// `f` of each; on several threads with feature `parallel`. The first error in order.
-fn each<T: Sync>(all: &[T], f: impl Fn(&T) -> Result<(), BuildError> + Sync) -> Result<(), BuildError> {
+/// The greatest height of a grid, without its sign.
+fn greatest(raster: &dyn Raster, control: &dyn Control) -> Result<f64, BuildError> {
+    let all: Vec<_> = windows(raster, 1 << 20).collect();
+    let one = |w: &Window| {
+        if control.cancelled() {
+            return Err(BuildError::Cancelled);
+        }
+        let grid = raster.window(*w)?;
+        // NaN gives way.
+        Ok(grid.heights().iter().fold(0.0f64, |most, h| most.max(h.abs())))
+    };
+    Ok(each(&all, one)?.into_iter().fold(0.0, f64::max))
+}
+
+/// The blocks of a level, row by row.
+fn in_rows(layout: &Layout, level: u32) -> Vec<[usize; 2]> {
+    let [across, down] = layout.blocks(level);
+    (0..down).flat_map(|y| (0..across).map(move |x| [x, y])).collect()
+}
+
+/// `f` of each, in order; on several threads with feature `parallel`. The first error in order.
+fn each<T: Sync, U: Send>(
+    all: &[T],
+    f: impl Fn(&T) -> Result<U, BuildError> + Sync,
+) -> Result<Vec<U>, BuildError> {
     #[cfg(feature = "parallel")]
     {
         use rayon::prelude::*;
-        let results: Vec<_> = all.par_iter().map(&f).collect();
+        let results: Vec<_> = all.par_iter().with_max_len(1).map(&f).collect();
         results.into_iter().collect()
     }
     #[cfg(not(feature = "parallel"))]
-    all.iter().try_for_each(f)
+    all.iter().map(f).collect()
+}
+
+/// Blocks that [`each`] works on at once.
+fn threads() -> usize {
+    #[cfg(feature = "parallel")]
+    return rayon::current_num_threads();
+    #[cfg(not(feature = "parallel"))]
+    1
 }
 
 struct Work<'a> {
@@ -230,25 +344,30 @@ impl Work<'_> {
     }
 
     /// Makes a block unless the store has it; true if it had.
-    fn make(&self, level: u32, at: [usize; 2]) -> Result<bool, BuildError> {
+    fn make(&self, level: u32, at: [usize; 2]) -> Result<(BlockHead, bool), BuildError> {
         let (block_name, sheet_name) = (name(level, at, "block"), name(level, at, "sheet"));
-        if self.store.has(&block_name)? && self.store.has(&sheet_name)? {
-            return Ok(true);
+        // The sheets of blocks that were joined are gone.
+        let joined = name(level + 1, [at[0] / 2, at[1] / 2], "block");
+        if self.store.has(&block_name)? && (self.store.has(&sheet_name)? || self.store.has(&joined)?) {
+            let start = self.store.start(&block_name, BlockHead::BYTES)?;
+            return Ok((BlockHead::from_bytes(&start).map_err(damaged)?, true));
         }
+        let mut below = vec![];
         let block = if level == 0 {
             leaf(self.raster, &self.layout, at, self.options.floor)?
         } else {
-            let mut sheets = vec![];
-            for child in children(&self.layout, level, at) {
-                sheets.push(self.sheet(level - 1, child)?);
-            }
+            below = children(&self.layout, level, at);
+            let sheets = below.iter().map(|&child| self.sheet(level - 1, child)).collect::<Result<_, _>>()?;
             let window = self.layout.window(level, at);
             let relief = Relief::read(self.raster, window, self.options.most_heights())?;
             join(sheets, &relief, &self.layout.rules(level, at, 0))?
         };
         self.store.put(&sheet_name, &block.sheet.to_bytes())?;
         self.store.put(&block_name, &block.to_bytes())?;
-        Ok(false)
+        for child in below {
+            self.store.remove(&name(level - 1, child, "sheet"))?;
+        }
+        Ok((block.head(), false))
     }
 
     fn sheet(&self, level: u32, at: [usize; 2]) -> Result<Sheet, BuildError> {
@@ -258,37 +377,39 @@ impl Work<'_> {
     fn block(&self, level: u32, at: [usize; 2]) -> Result<Block, BuildError> {
         Block::from_bytes(&self.store.get(&name(level, at, "block"))?).map_err(damaged)
     }
+}
 
-    /// All splits, from the root down, each level row by row.
-    fn number(&self, levels: u32, blocks: usize, found: usize) -> Result<Built, BuildError> {
-        let root = self.sheet(levels - 1, [0, 0])?;
-        let (mut assembly, numbers) = Assembly::new(&root, self.options.scale());
-        let mut here = vec![([0, 0], numbers)];
-        let mut error = 0.0f64;
-        for level in (0..levels).rev() {
+impl Blocks<'_> {
+    /// What they come to.
+    #[must_use]
+    pub fn figures(&self) -> &Figures {
+        &self.figures
+    }
+
+    /// All splits as one mesh, from the root down, each level row by row.
+    ///
+    /// # Errors
+    /// [`BuildError`].
+    pub fn mesh(&self) -> Result<ProgressiveMesh, BuildError> {
+        let (vertices, faces) = (self.root.vertices.len() as u32, self.root.faces.len() as u32);
+        let mut assembly = Assembly::new(self.frame, vertices, faces);
+        let mut here = vec![([0, 0], Numbers::of(&self.root))];
+        for level in (0..self.figures.levels).rev() {
             let mut below = vec![];
             for (at, numbers) in here {
-                if self.control.cancelled() {
+                if self.work.control.cancelled() {
                     return Err(BuildError::Cancelled);
                 }
-                let block = self.block(level, at)?;
-                error = error.max(block.error);
-                let of_children = assembly.add(&block, numbers)?;
+                let of_children = assembly.add(&self.work.block(level, at)?, &numbers)?;
                 if level > 0 {
-                    below.extend(children(&self.layout, level, at).into_iter().zip(of_children));
+                    below.extend(children(&self.work.layout, level, at).into_iter().zip(of_children));
                 }
             }
             below.sort_by_key(|(at, _)| [at[1], at[0]]);
             here = below;
         }
-        if assembly.mesh.base_faces.is_empty() {
-            return Err(BuildError::Nothing);
-        }
-        self.control.progress(1.0);
-        let spacing = self.options.spacing;
-        let (mesh, rounding) = assembly.finish().map_err(|e| damaged_by(e.to_string()))?;
-        let error = error + rounding * spacing[0];
-        Ok(Built { mesh, spacing, error, levels, blocks, found })
+        self.work.control.progress(1.0);
+        assembly.mesh(self.frame.base(&self.root)).map_err(|e| damaged_by(e.to_string()))
     }
 }
 

@@ -1,8 +1,11 @@
 //! Progressive terrain: the splits are those of a progressive mesh, and their bounds hold for what views show.
 
-use progmesh::blocks::{InMemory, Options, Store, build};
-use progmesh::refine::format::{EncodeOptions, decode, encode};
-use progmesh::refine::{Hierarchy, hierarchy, selective::View};
+use progmesh::blocks::{InMemory, Options, Store, blocks, build};
+use progmesh::refine::format::{ChunkType, EncodeOptions, Piece, RangeReader, decode, encode};
+use progmesh::refine::paged::{PagedLimits, PagedView};
+use progmesh::refine::selective::{Cull, Lens, Limits, View};
+use progmesh::refine::view::{Camera, CameraParameters, Projection};
+use progmesh::refine::{Hierarchy, ProgressiveMesh, hierarchy};
 use progmesh::terrain::Grid;
 use progmesh::terrain::tin::Quiet;
 use std::sync::Arc;
@@ -26,7 +29,7 @@ fn full_detail_is_the_grid() {
         let pm = &built.mesh;
         let mut cursor = pm.cursor().unwrap();
         if !hole {
-            assert_eq!((pm.base_vertices(), pm.base_faces.len()), (4, 2));
+            assert!(pm.base_faces.len() <= 12);
         }
         cursor.seek(usize::MAX).unwrap();
         let full = cursor.to_input();
@@ -81,6 +84,139 @@ fn it_can_be_written_so_that_chunks_are_read_alone() {
     let mut cursor = back.meshes[0].cursor().unwrap();
     cursor.seek(usize::MAX).unwrap();
     assert_eq!(cursor.to_input().corners.len(), 3 * 2 * 64 * 64);
+}
+
+/// A file written block by block.
+fn file(grid: &Grid, options: &Options, store: &InMemory) -> Vec<u8> {
+    let blocks = blocks(grid, options, store, &Quiet).unwrap();
+    let mut bytes = vec![];
+    let length = blocks.code().unwrap().write(b"scene", &[], &mut bytes).unwrap();
+    assert_eq!(length, bytes.len() as u64);
+    bytes
+}
+
+/// The triangles at full detail, by the bits of their corners.
+fn full(pm: &ProgressiveMesh) -> Vec<[[u64; 3]; 3]> {
+    let mut cursor = pm.cursor().unwrap();
+    cursor.seek(usize::MAX).unwrap();
+    let full = cursor.to_input();
+    let at = |v: u32| full.positions.get(v as usize).to_array().map(f64::to_bits);
+    let mut all: Vec<_> = full
+        .corners
+        .chunks(3)
+        .map(|t| {
+            let t = [0, 1, 2].map(|k| at(t[k]));
+            [0, 1, 2].map(|k| [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]).into_iter().min().unwrap()
+        })
+        .collect();
+    all.sort_unstable();
+    all
+}
+
+/// Spheres and cones hold the faces of the finest mesh around all vertices that come of a split: by plain search.
+fn bounds_hold_what_is_below(pm: &ProgressiveMesh) {
+    let bounds = pm.bounds.as_ref().unwrap();
+    let n0 = pm.base_vertices();
+    let mut cursor = pm.cursor().unwrap();
+    cursor.seek(usize::MAX).unwrap();
+    let corners = cursor.to_input().corners;
+    let place = |v: u32| match (v as usize).checked_sub(n0) {
+        None => pm.base_positions.get(v as usize),
+        Some(k) => pm.new_positions.get(k),
+    };
+    let mut around: Vec<Vec<usize>> = vec![vec![]; pm.vertices()];
+    corners.iter().enumerate().for_each(|(k, &v)| around[v as usize].push(k / 3));
+    let mut below: Vec<Vec<u32>> = (0..pm.vertices() as u32).map(|v| vec![v]).collect();
+    for (i, &v) in pm.splits.vertex.iter().enumerate().rev() {
+        let new = std::mem::take(&mut below[n0 + i]);
+        below[v as usize].extend(new);
+        let (centre, radius, cone) = (place(v), bounds.radius(i), bounds.cone(i));
+        for f in below[v as usize].iter().flat_map(|&v| &around[v as usize]) {
+            let t = [0, 1, 2].map(|k| place(corners[3 * f + k]));
+            assert!(t.iter().all(|p| p.distance(centre) <= radius));
+            let normal = (t[1] - t[0]).cross(t[2] - t[0]);
+            assert!(cone.axis().angle_between(normal) <= cone.half_angle());
+        }
+    }
+}
+
+#[test]
+fn written_block_by_block_it_is_the_same_terrain() {
+    for (spacing, hole, floor) in [([1.0; 2], false, 0.0), ([4.0, 6.0], true, 0.0), ([1.0; 2], true, 3.0)] {
+        let grid = landscape(75, 50, hole);
+        let options = Options::default().with_cells(8).with_spacing(spacing).with_floor(floor);
+        let built = build(&grid, &options, &InMemory::default(), &Quiet).unwrap();
+        let store = InMemory::default();
+        let bytes = file(&grid, &options, &store);
+        let back = decode(&bytes).unwrap();
+        let pm = &back.meshes[0];
+        assert_eq!(full(pm), full(&built.mesh));
+        assert_eq!(
+            (&pm.base_faces, &pm.base_positions),
+            (&built.mesh.base_faces, &built.mesh.base_positions)
+        );
+        // The same splits, by the vertices that they make, with the same errors but for rounding.
+        let errors = |pm: &ProgressiveMesh| {
+            let bounds = pm.bounds.as_ref().unwrap();
+            let of =
+                |i: usize| (pm.new_positions.get(i).to_array().map(f64::to_bits), bounds.error(i).to_bits());
+            let mut all: Vec<_> = (0..pm.splits.len()).map(of).collect();
+            all.sort_unstable();
+            all
+        };
+        assert_eq!(errors(pm), errors(&built.mesh));
+        bounds_hold_what_is_below(pm);
+        // Every chunk is read alone.
+        let reader = RangeReader::new(&bytes[..]).unwrap();
+        let (head, _) = reader.base(0).unwrap();
+        let chunks = &reader.directory().chunks;
+        let mut first = 0;
+        for c in chunks.iter().filter(|c| c.kind == ChunkType::SPLITS) {
+            let Piece::Splits(block) = reader.read(c.index, Some(&head)).unwrap() else { panic!() };
+            let all = first..first + block.splits.len();
+            assert_eq!(block.splits.vertex, pm.splits.vertex[all.clone()]);
+            assert_eq!(block.splits.left, pm.splits.left[all.clone()]);
+            first = all.end;
+        }
+        assert_eq!(first, pm.splits.len());
+        // What was put aside is not made again, and threads do not show.
+        assert_eq!(file(&grid, &options, &store), bytes);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        assert_eq!(pool.install(|| file(&grid, &options, &InMemory::default())), bytes);
+    }
+}
+
+#[test]
+fn what_is_written_block_by_block_is_refined_out_of_core_as_in_memory() {
+    let grid = landscape(60, 60, true);
+    let bytes = file(&grid, &Options::default().with_cells(8), &InMemory::default());
+    let mesh = decode(&bytes).unwrap().meshes.remove(0);
+    let h = Arc::new(Hierarchy::new(Arc::new(mesh), &hierarchy::Options::CUTS.with_rounds(0)).unwrap());
+    let (centre, diagonal) = h.extent();
+    let mut view = View::new(h.clone());
+    let mut paged = PagedView::new(Arc::new(RangeReader::new(&bytes[..]).unwrap()), 0, 1 << 28).unwrap();
+    assert_eq!(paged.extent(), (centre, diagonal));
+    for k in 0..4 {
+        let direction = glam::DVec3::new((0.9 * f64::from(k)).cos(), 0.5, (0.9 * f64::from(k)).sin());
+        let camera = Camera::new(&CameraParameters {
+            eye: centre + 0.6 * diagonal * direction,
+            target: centre,
+            up: glam::DVec3::Y,
+            projection: Projection::Perspective { fov_y_deg: 45.0 },
+            width: 640,
+            height: 480,
+            near: 1e-3 * diagonal,
+            far: 1e3 * diagonal,
+        })
+        .unwrap();
+        let lens = Lens::new(&h, &camera, &glam::DMat4::IDENTITY, 3.0, Cull::All).unwrap();
+        let done = view.adapt(&lens, &Limits::default());
+        let lens = paged.lens(&camera, &glam::DMat4::IDENTITY, 3.0, Cull::All).unwrap();
+        let found = paged.adapt(&[lens], &PagedLimits::default()).unwrap().done;
+        assert!(done.complete && (found.splits, found.collapses) == (done.splits, done.collapses));
+        assert_eq!((view.face_count(), view.vertex_count()), (paged.face_count(), paged.vertex_count()));
+        assert!(view.face_count() > 50 && view.face_count() < 2 * 59 * 59);
+    }
 }
 
 /// Any set of splits that a view may hold: at every sample the mesh is as near as the bounds of the splits not made say.

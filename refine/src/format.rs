@@ -26,6 +26,7 @@ mod read;
 mod residual;
 mod rows;
 mod splits;
+pub mod stream;
 mod walk;
 mod write;
 

@@ -22,10 +22,8 @@ mod settled;
 mod spheres;
 mod tree;
 
-#[cfg(test)]
-pub(crate) use bounds::pack_up;
 pub use bounds::{Bounds, Guarantee, SplitBounds};
-pub(crate) use bounds::{Packed, unpack};
+pub(crate) use bounds::{Packed, pack_up, unpack};
 pub(crate) use cone::Cone;
 pub(crate) use forest::Forest;
 pub(crate) use rows::SplitRows;

@@ -18,11 +18,23 @@ pub trait Store: Sync {
     /// The system's; nothing of this name.
     fn get(&self, name: &str) -> io::Result<Vec<u8>>;
 
+    /// The first `bytes` of what was put there, or all of it if that is less.
+    ///
+    /// # Errors
+    /// As [`Store::get`].
+    fn start(&self, name: &str, bytes: usize) -> io::Result<Vec<u8>>;
+
     /// Puts bytes there.
     ///
     /// # Errors
     /// The system's.
     fn put(&self, name: &str, bytes: &[u8]) -> io::Result<()>;
+
+    /// Removes what was put there, if there is anything.
+    ///
+    /// # Errors
+    /// The system's.
+    fn remove(&self, name: &str) -> io::Result<()>;
 }
 
 /// A store in memory.
@@ -37,6 +49,18 @@ impl Store for InMemory {
     fn get(&self, name: &str) -> io::Result<Vec<u8>> {
         let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.get(name).cloned().ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, name.to_string()))
+    }
+
+    fn start(&self, name: &str, bytes: usize) -> io::Result<Vec<u8>> {
+        self.get(name).map(|mut all| {
+            all.truncate(bytes);
+            all
+        })
+    }
+
+    fn remove(&self, name: &str) -> io::Result<()> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(name);
+        Ok(())
     }
 
     fn put(&self, name: &str, bytes: &[u8]) -> io::Result<()> {

@@ -573,7 +573,7 @@ impl WorkFolder {
 
     fn clear(&self) -> io::Result<()> {
         self.clear_temporary()?;
-        self.clear_by(|name| name.ends_with(".block") || name.ends_with(".sheet"))?;
+        self.clear_by(|name| [".block", ".sheet", ".chunks"].iter().any(|end| name.ends_with(end)))?;
         self.clear_by(|name| name == BELONGS)
     }
 
@@ -601,8 +601,21 @@ impl crate::blocks::Store for WorkFolder {
         fs::read(self.path.join(name))
     }
 
+    fn start(&self, name: &str, bytes: usize) -> io::Result<Vec<u8>> {
+        let mut out = Vec::new();
+        File::open(self.path.join(name))?.take(bytes as u64).read_to_end(&mut out)?;
+        Ok(out)
+    }
+
     fn put(&self, name: &str, bytes: &[u8]) -> io::Result<()> {
         write_file(&self.path.join(name), bytes)
+    }
+
+    fn remove(&self, name: &str) -> io::Result<()> {
+        match fs::remove_file(self.path.join(name)) {
+            Err(e) if e.kind() != ErrorKind::NotFound => Err(e),
+            _ => Ok(()),
+        }
     }
 }
 

@@ -219,9 +219,8 @@ fn check(grid: &Grid, whole: &Whole, applied: &[bool]) -> f64 {
         };
         let area = side(v[0], v[1], v[2].x, v[2].y);
         area_sum += area;
-        if area == 0.0 {
-            continue;
-        }
+        // Each lies the right way round, and all together cover no more than there is.
+        assert!(area > 0.0);
         let (x0, x1) = (v.iter().map(|v| v.x).min().unwrap(), v.iter().map(|v| v.x).max().unwrap());
         let (y0, y1) = (v.iter().map(|v| v.y).min().unwrap(), v.iter().map(|v| v.y).max().unwrap());
         for (x, y) in (y0..=y1).flat_map(|y| (x0..=x1).map(move |x| (x, y))) {
@@ -287,7 +286,8 @@ fn bounds_hold_for_any_closed_set_of_splits() {
         let (whole, root) = build(&grid, cells, floor, samples);
         assert!(whole.error <= floor, "{}", whole.error);
         if !voids {
-            assert_eq!((root.vertices.len(), root.faces.len()), (4, 2));
+            // Two triangles, or a few where another would make faces turn over.
+            assert!(root.faces.len() <= 12, "{}", root.faces.len());
         }
         let n = whole.collapses.len();
         // All, none, and in the order of the collapses.

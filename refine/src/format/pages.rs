@@ -75,22 +75,41 @@ impl Codec {
 }
 
 /// Where links come from when they are written.
-#[derive(Clone, Copy)]
-struct Source<'a> {
-    tree: &'a Tree,
-    bounds: &'a Bounds,
+pub(super) trait Source {
+    /// The node that split `i` replaces.
+    fn parent(&self, i: u32) -> u32;
+
+    /// The split that replaces a node; [`NONE`] for a leaf.
+    fn next(&self, node: u32) -> u32;
+
+    /// The bounds of a split that replaces a node.
+    fn bounds(&self, i: u32) -> Packed;
 }
 
-impl Source<'_> {
-    /// The split that replaces a node, if that is a later one.
+/// Of a mesh that is there as a whole.
+#[derive(Clone, Copy)]
+pub(super) struct Whole<'a> {
+    pub(super) tree: &'a Tree,
+    pub(super) bounds: &'a Bounds,
+}
+
+impl Source for Whole<'_> {
+    fn parent(&self, i: u32) -> u32 {
+        self.tree.parent[i as usize]
+    }
+
     fn next(&self, node: u32) -> u32 {
         self.tree.split_of[node as usize]
+    }
+
+    fn bounds(&self, i: u32) -> Packed {
+        self.bounds.of.get(i as usize).copied().unwrap_or_default()
     }
 }
 
 /// The bounds of a split when they are written; anything when they are read.
-fn bounds_in(source: Option<Source<'_>>, i: u32) -> Packed {
-    source.and_then(|s| s.bounds.of.get(i as usize).copied()).unwrap_or_default()
+fn bounds_in(source: Option<&dyn Source>, i: u32) -> Packed {
+    source.map(|s| s.bounds(i)).unwrap_or_default()
 }
 
 /// Codes the links of the splits from `first` on, of the vertices and with the bounds given.
@@ -100,7 +119,7 @@ fn code<C: Coder>(
     first: u32,
     vertices: &[u32],
     own: &[Packed],
-    source: Option<Source<'_>>,
+    source: Option<&dyn Source>,
 ) -> Option<Links> {
     let (n0, count) = (head.base_vertices, vertices.len());
     let end = first.checked_add(u32::try_from(count).ok()?)?;
@@ -123,9 +142,9 @@ fn code<C: Coder>(
             None => {
                 let maker = v.checked_sub(n0);
                 let start = maker.map_or(v, |j| n0 + 2 * j + 1);
-                let back = source.map_or(0, |s| match s.tree.parent[i as usize] {
+                let back = source.map_or(0, |s| match s.parent(i) {
                     p if p == start => 0,
-                    p => first - s.tree.maker(p),
+                    p => first - (p - n0) / 2,
                 });
                 match u32::try_from(c.number(&mut codec.parent, back as u64)).ok()? {
                     0 => start,
@@ -176,7 +195,7 @@ fn code_base<C: Coder>(
     c: &mut C,
     head: &MeshHead,
     links: &mut BaseLinks,
-    source: Option<Source<'_>>,
+    source: Option<&dyn Source>,
 ) -> Option<()> {
     let mut codec = Codec::default();
     let (mut last, mut near) = (0, Parts::default());
@@ -195,17 +214,16 @@ fn code_base<C: Coder>(
     Some(())
 }
 
-/// The `PAGE` of the splits from `first` on, of the vertices given, and what it takes in memory. `None` if the arrays contradict each other.
+/// The `PAGE` of the splits from `first` on, of the vertices and with the bounds given, and what it takes in memory. `None` if the arrays contradict each other.
 pub(super) fn write(
     head: &MeshHead,
     first: u32,
     vertices: &[u32],
-    tree: &Tree,
-    bounds: &Bounds,
+    own: &[Packed],
+    source: &dyn Source,
 ) -> Option<(Vec<u8>, u64)> {
-    let own = bounds.of.get(first as usize..first as usize + vertices.len())?;
     let mut e = Encoder::default();
-    let links = code(&mut e, head, first, vertices, own, Some(Source { tree, bounds }))?;
+    let links = code(&mut e, head, first, vertices, own, Some(source))?;
     let mut out = Vec::new();
     e.finish(&mut out);
     Some((out, raw_bytes(&links)))
@@ -230,15 +248,18 @@ pub(crate) fn read(
     (raw_bytes(&links) == raw).then_some(links)
 }
 
-/// The `PAGE` of a base.
-pub(super) fn write_base(head: &MeshHead, tree: &Tree, bounds: &Bounds) -> Option<(Vec<u8>, u64)> {
+/// The `PAGE` of a base; bounds are about `origin`.
+pub(super) fn write_base(
+    head: &MeshHead,
+    (origin, diagonal): (DVec3, f64),
+    source: &dyn Source,
+) -> Option<(Vec<u8>, u64)> {
     let mut out = Vec::new();
-    let (origin, diagonal) = bounds.extent();
     for x in origin.to_array().into_iter().chain([diagonal]) {
         out.extend_from_slice(&x.to_le_bytes());
     }
     let mut e = Encoder::default();
-    code_base(&mut e, head, &mut BaseLinks::default(), Some(Source { tree, bounds }))?;
+    code_base(&mut e, head, &mut BaseLinks::default(), Some(source))?;
     e.finish(&mut out);
     Some((out, raw_bytes_of_base(head)))
 }

@@ -105,14 +105,15 @@ pub enum EncodeError {
 }
 
 /// A chunk and its bytes.
-struct Part {
-    chunk: Chunk,
-    bytes: Vec<u8>,
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    pub(super) chunk: Chunk,
+    pub(super) bytes: Vec<u8>,
     /// Where in the common order of all splits it belongs: the mean of its splits' places.
     turn: f64,
 }
 
-fn part(kind: ChunkType, critical: bool, mesh: u32, raw: u64, mut bytes: Vec<u8>) -> Part {
+pub(super) fn part(kind: ChunkType, critical: bool, mesh: u32, raw: u64, mut bytes: Vec<u8>) -> Part {
     bytes.resize(bytes.len().max(raw.div_ceil(EXPANSION) as usize), 0);
     let chunk = Chunk {
         kind,
@@ -314,7 +315,7 @@ fn encode_mesh(
     let paged = paged.map(|b| (b, Tree::new(&pm)));
     let page = match &paged {
         Some((bounds, tree)) => {
-            let (bytes, raw) = pages::write_base(&head, tree, bounds)?;
+            let (bytes, raw) = pages::write_base(&head, bounds.extent(), &pages::Whole { tree, bounds })?;
             let mut page = part(ChunkType::PAGE, false, m, raw, bytes);
             (page.chunk.count, page.chunk.first_face) = (head.base_vertices, head.base_wedges);
             Some(page)
@@ -331,7 +332,8 @@ fn encode_mesh(
             Some((bounds, tree)) => {
                 let Chunk { first, count, band, subtree, error, .. } = p.chunk;
                 let vertices = &pm.splits.vertex[at.split..at.split + count as usize];
-                let (bytes, raw) = pages::write(&head, first, vertices, tree, bounds)?;
+                let own = bounds.of.get(at.split..at.split + count as usize)?;
+                let (bytes, raw) = pages::write(&head, first, vertices, own, &pages::Whole { tree, bounds })?;
                 let mut page = part(ChunkType::PAGE, false, m, raw, bytes);
                 page.chunk = Chunk { first, count, band, subtree, error, ..page.chunk };
                 page.chunk.first_face = at.wedge as u32;
@@ -350,18 +352,23 @@ fn encode_mesh(
 /// The bounds of a chunk of splits, to stand behind it.
 fn bounds_of(splits: &Part, bounds: &Bounds) -> Option<Part> {
     let (first, count) = (splits.chunk.first as usize, splits.chunk.count as usize);
-    let bytes = bounds::write(bounds, first..first + count)?;
+    bounds_beside(splits, bounds, first..first + count)
+}
+
+/// The same of those in a range.
+pub(super) fn bounds_beside(splits: &Part, bounds: &Bounds, range: std::ops::Range<usize>) -> Option<Part> {
+    let bytes = bounds::write(bounds, range.clone())?;
     let mut p = part(
         ChunkType::BOUNDS,
         false,
         splits.chunk.mesh,
-        bounds::raw_bytes(bounds.guarantee(), count),
+        bounds::raw_bytes(bounds.guarantee(), range.len()),
         bytes,
     );
     p.turn = splits.turn;
     let Chunk { first, count, band, subtree, .. } = splits.chunk;
     p.chunk = Chunk { first, count, band, subtree, ..p.chunk };
-    p.chunk.error = (first..first + count).map(|i| bounds.error(i as usize) as f32).fold(0.0, f32::max);
+    p.chunk.error = range.map(|i| bounds.error(i) as f32).fold(0.0, f32::max);
     Some(p)
 }
 
@@ -401,7 +408,7 @@ fn starts(pm: &ProgressiveMesh, rows: &[RowsOf], pieces: &[Piece]) -> Vec<Counts
 }
 
 /// What [`splits::SplitBlock::bytes`] says of these splits.
-fn raw_bytes(head: &MeshHead, a: Counts, b: Counts) -> u64 {
+pub(super) fn raw_bytes(head: &MeshHead, a: Counts, b: Counts) -> u64 {
     let splits = (b.split - a.split) as u64;
     let point = if head.double { 24 } else { 12 };
     let rows = if head.channels.is_some() { (b.row - a.row) as u64 } else { 0 };

@@ -326,7 +326,10 @@ mod tests {
             let k = i as usize;
             let (code, v) = (pm.splits.code[k], pm.splits.vertex[k]);
             assert_eq!(f.parent(&pm, i), tree.parent[k]);
-            assert_eq!(ups[k], tree.maker(tree.parent[k]));
+            assert_eq!(
+                ups[k],
+                tree.parent[k].checked_sub(pm.base_vertices() as u32).map_or(NONE, |p| p >> 1)
+            );
             assert_eq!(f.below(&pm, i), f.nodes(i).map(|node| tree.split_of[node as usize]));
             assert_eq!(f.first_face(i), face);
             assert_eq!(f.maker_of_face(face), Some((i, false)));

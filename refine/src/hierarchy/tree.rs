@@ -6,7 +6,6 @@ use crate::progressive::ProgressiveMesh;
 /// For every split the node it replaces, and for every node the split that replaces it: 12 B a split. Views have the same from [`super::Forest`] in half of that.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tree {
-    base_vertices: u32,
     /// The node that each split replaces.
     pub(crate) parent: Vec<u32>,
     /// The split that replaces each node; [`NONE`] for a leaf.
@@ -28,12 +27,6 @@ impl Tree {
             node[v as usize] = n0 + 2 * i;
             node.push(n0 + 2 * i + 1);
         }
-        Tree { base_vertices: n0, parent, split_of }
-    }
-
-    /// The split that made a node; [`NONE`] for the base's.
-    #[inline]
-    pub(crate) fn maker(&self, node: u32) -> u32 {
-        node.checked_sub(self.base_vertices).map_or(NONE, |k| k >> 1)
+        Tree { parent, split_of }
     }
 }

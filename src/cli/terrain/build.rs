@@ -6,10 +6,10 @@ use crate::cli::args;
 use crate::cli::common::{self, Warnings, short, thousands};
 use crate::cli::control::{Interrupt, Progress};
 use crate::cli::ending::PmEnding;
-use progmesh::blocks::{self, BuildError, Built, Options};
+use progmesh::blocks::{self, BuildError, Figures, Options};
 use progmesh::io::files::{self, WorkFolder};
 use progmesh::io::grid::GridFile;
-use progmesh::io::pm::{Terrain, encode_terrain};
+use progmesh::io::pm::{Terrain, write_terrain};
 use progmesh::terrain::block::BlockError;
 use progmesh::terrain::tin;
 use serde::Serialize;
@@ -98,17 +98,28 @@ impl Args {
                 .with_memory(self.memory << 20)
                 .with_spacing(spacing(&source));
             let progress = Progress::new(&interrupt, self.ending.quiet, "building");
+            let watch = Watch(&progress);
+            let failed = |e: &BuildError| failure(&file, &out, &path, self.ending.quiet, e);
             let building = Instant::now();
-            let built = blocks::build(&*source.raster, &options, &folder, &Watch(&progress))
-                .map_err(|e| failure(&file, &path, self.ending.quiet, &e))?;
-            drop(progress);
+            let blocks =
+                blocks::blocks(&*source.raster, &options, &folder, &watch).map_err(|e| failed(&e))?;
             let build = building.elapsed().as_secs_f64();
             let encoding = Instant::now();
-            let terrain = terrain(&source, &built, self.block);
-            let bytes =
-                encode_terrain(&built, &terrain).map_err(|e| Failure::Output(format!("{out}: {e}")))?;
+            let coded = blocks.code().map_err(|e| failed(&e))?;
             let encode = encoding.elapsed().as_secs_f64();
-            let write = self.ending.write(&bytes, &interrupt)?;
+            if interrupt.is_set() {
+                return Err(Failure::Interrupted);
+            }
+            let writing = Instant::now();
+            let figures = *blocks.figures();
+            let terrain = terrain(&source, &figures, self.block);
+            let mut bytes = 0;
+            files::write_with(self.ending.path(), |to| {
+                bytes = write_terrain(&coded, &terrain, to)?;
+                Ok::<_, OnWriting>(())
+            })
+            .map_err(|e| failed(&e.0))?;
+            let write = writing.elapsed().as_secs_f64();
             folder.remove().map_err(in_folder)?;
             Ok(Report {
                 command: "terrain build",
@@ -116,16 +127,16 @@ impl Args {
                 columns: terrain.columns as usize,
                 rows: terrain.rows as usize,
                 floor: self.floor,
-                error: built.error,
+                error: figures.error,
                 block: self.block,
-                levels: built.levels,
-                blocks: built.blocks,
-                blocks_found: built.found,
-                vertices: built.mesh.vertices(),
-                triangles: built.mesh.faces(),
-                base_triangles: built.mesh.base_faces.len(),
-                splits: built.mesh.splits.len(),
-                bytes: bytes.len(),
+                levels: figures.levels,
+                blocks: figures.blocks,
+                blocks_found: figures.found,
+                vertices: figures.vertices,
+                triangles: figures.triangles,
+                base_triangles: figures.base_triangles,
+                splits: figures.splits,
+                bytes: bytes as usize,
                 peak_bytes: files::peak_bytes(),
                 seconds: Seconds { read, build, encode, write, total: start.elapsed().as_secs_f64() },
                 warnings: vec![],
@@ -138,7 +149,7 @@ impl Args {
     /// What finished blocks belong to: grid, options that change them, and this version.
     fn belongs(&self, source: &GridFile) -> Result<String, Failure> {
         Ok(format!(
-            "progmesh {} terrain build\n{}\n{} x {}, {:?}\nfloor {:?} block {} memory {}\n",
+            "progmesh {} terrain build, blocks 2\n{}\n{} x {}, {:?}\nfloor {:?} block {} memory {}\n",
             env!("CARGO_PKG_VERSION"),
             self.input.identity()?,
             source.raster.columns(),
@@ -156,7 +167,7 @@ fn spacing(source: &GridFile) -> [f64; 2] {
     known_spacing(source).unwrap_or([1.0; 2])
 }
 
-fn terrain(source: &GridFile, built: &Built, block: usize) -> Terrain {
+fn terrain(source: &GridFile, built: &Figures, block: usize) -> Terrain {
     let (columns, rows) = (source.raster.columns(), source.raster.rows());
     Terrain {
         columns: columns as u32,
@@ -168,8 +179,24 @@ fn terrain(source: &GridFile, built: &Built, block: usize) -> Terrain {
     }
 }
 
-fn failure(file: &str, folder: &Path, quiet: bool, e: &BuildError) -> Failure {
+/// Why the file was not written.
+struct OnWriting(BuildError);
+
+impl From<BuildError> for OnWriting {
+    fn from(e: BuildError) -> Self {
+        OnWriting(e)
+    }
+}
+
+impl From<std::io::Error> for OnWriting {
+    fn from(e: std::io::Error) -> Self {
+        OnWriting(BuildError::Write(e))
+    }
+}
+
+fn failure(file: &str, out: &str, folder: &Path, quiet: bool, e: &BuildError) -> Failure {
     match e {
+        BuildError::Write(e) => Failure::Output(format!("{out}: {e}")),
         BuildError::Cancelled => {
             if !quiet {
                 let kept = folder.display();

@@ -6,7 +6,7 @@ pub mod hoppe;
 mod terrain;
 
 pub use chunk::{read_shell, write_shell};
-pub use terrain::{Terrain, encode_terrain};
+pub use terrain::{Terrain, write_terrain};
 
 use super::{DecodeError, Decoded};
 use crate::aif::NONE;

@@ -1,11 +1,12 @@
 //! Progressive terrains as `.pm` files.
 
 use super::write_shell;
-use crate::blocks::Built;
+use crate::blocks::{BuildError, Coded};
 use crate::progressive::shell_of;
-use crate::refine::format::{self, ChunkType, EncodeOptions};
+use crate::refine::format::ChunkType;
 use crate::scene::{Scene, SceneMesh};
 use glam::{DMat4, DVec3};
+use std::io::Write;
 
 /// What a mesh is of a height grid: a `TERR` chunk. The mesh has x = column, and y = height and z = row in the length of a step by a column.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,10 +63,12 @@ impl Terrain {
     }
 }
 
-/// Writes a progressive terrain, in chunks that are read alone. In the scene it stands as [`crate::ground::Space::World`] says: the middle of the grid at the origin.
+/// Writes a progressive terrain, in chunks that are read alone, level by level; returns how many bytes it has. In the scene it stands as [`crate::ground::Space::World`] says: the middle of the grid at
+/// the origin.
 ///
-/// Errors: none that a terrain just built could have.
-pub fn encode_terrain(built: &Built, terrain: &Terrain) -> Result<Vec<u8>, format::EncodeError> {
+/// # Errors
+/// Those of the store and of `out`.
+pub fn write_terrain(coded: &Coded<'_>, terrain: &Terrain, out: &mut dyn Write) -> Result<u64, BuildError> {
     let mesh = SceneMesh { name: Some("terrain".into()), ..SceneMesh::default() };
     let mut scene = Scene::from_mesh(mesh);
     let [x, z] = terrain.spacing;
@@ -75,9 +78,7 @@ pub fn encode_terrain(built: &Built, terrain: &Terrain) -> Result<Vec<u8>, forma
         node.transform = DMat4::from_translation(origin) * DMat4::from_scale(DVec3::splat(x));
     }
     let shell = write_shell(&shell_of(scene), &[]);
-    let options =
-        EncodeOptions::default().with_pages(true).with_other(ChunkType::TERRAIN, 0, terrain.to_bytes());
-    format::encode(std::slice::from_ref(&built.mesh), &[], &shell, &options)
+    coded.write(&shell, &[(ChunkType::TERRAIN, terrain.to_bytes())], out)
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Blocks as bytes, so that one may be put aside while others are made. Little-endian, not portable between versions: a cache, no file format.
 
 use super::Collapse;
-use super::join::{Block, Child};
-use super::sheet::{Former, Gone, Sheet, Vertex};
+use super::join::{Block, BlockHead, Child};
+use super::sheet::{Former, Gone, Round, Sheet, Vertex};
 
 /// Bytes that are no block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -53,12 +53,22 @@ impl Words<8> for Gone {
     }
 }
 
-impl Words<2> for [f32; 2] {
+impl Words<1> for f32 {
+    fn to(&self) -> [u32; 1] {
+        [self.to_bits()]
+    }
+    fn of([x]: [u32; 1]) -> Self {
+        f32::from_bits(x)
+    }
+}
+
+impl Words<2> for Round {
     fn to(&self) -> [u32; 2] {
-        self.map(f32::to_bits)
+        [self.reach, self.upright].map(f32::to_bits)
     }
     fn of(w: [u32; 2]) -> Self {
-        w.map(f32::from_bits)
+        let [reach, upright] = w.map(f32::from_bits);
+        Round { reach, upright }
     }
 }
 
@@ -81,13 +91,14 @@ impl Words<6> for [[u32; 2]; 3] {
     }
 }
 
-impl Words<10> for Collapse {
-    fn to(&self) -> [u32; 10] {
+impl Words<11> for Collapse {
+    fn to(&self) -> [u32; 11] {
         let [[a, b], [c, d]] = self.beside;
         let [l, r] = self.wings;
-        [self.kept, self.removed, l, r, a, b, c, d, self.bound.to_bits(), self.radius.to_bits()]
+        let [bound, radius, upright] = [self.bound, self.radius, self.upright].map(f32::to_bits);
+        [self.kept, self.removed, l, r, a, b, c, d, bound, radius, upright]
     }
-    fn of([kept, removed, l, r, a, b, c, d, bound, radius]: [u32; 10]) -> Self {
+    fn of([kept, removed, l, r, a, b, c, d, bound, radius, upright]: [u32; 11]) -> Self {
         Collapse {
             kept,
             removed,
@@ -95,13 +106,15 @@ impl Words<10> for Collapse {
             beside: [[a, b], [c, d]],
             bound: f32::from_bits(bound),
             radius: f32::from_bits(radius),
+            upright: f32::from_bits(upright),
         }
     }
 }
 
 fn put<const N: usize, T: Words<N>>(out: &mut Vec<u8>, all: &[T]) {
+    out.reserve(4 + 4 * N * all.len());
     out.extend_from_slice(&(all.len() as u32).to_le_bytes());
-    all.iter().flat_map(Words::to).for_each(|w| out.extend_from_slice(&w.to_le_bytes()));
+    all.iter().for_each(|x| out.extend_from_slice(x.to().map(u32::to_le_bytes).as_flattened()));
 }
 
 fn take_word(from: &mut &[u8]) -> Result<u32, Damaged> {
@@ -128,6 +141,7 @@ impl Sheet {
         put(&mut out, &self.faces);
         put(&mut out, &self.joined);
         put(&mut out, &self.last);
+        put(&mut out, &self.round);
         put(&mut out, &self.counts);
         put(&mut out, &self.open);
         put(&mut out, &self.gone);
@@ -147,6 +161,7 @@ impl Sheet {
             faces: take(from)?,
             joined: take(from)?,
             last: take(from)?,
+            round: take(from)?,
             counts: take(from)?,
             open: take(from)?,
             gone: take(from)?,
@@ -157,13 +172,47 @@ impl Sheet {
     }
 }
 
+impl BlockHead {
+    /// How many bytes of a block it takes.
+    pub const BYTES: usize = 44;
+
+    fn to_bytes(self) -> [u8; Self::BYTES] {
+        let mut out = [0; Self::BYTES];
+        let error = self.error.to_bits();
+        let [[x0, x1], [y0, y1]] = [self.columns, self.rows].map(|r| r.map(|x| x as u32));
+        let [z0, z1] = self.heights.map(f32::to_bits);
+        let counts = [self.collapses, self.faces, self.faces_left];
+        let words = [error as u32, (error >> 32) as u32].into_iter().chain(counts);
+        for (four, w) in out.as_chunks_mut().0.iter_mut().zip(words.chain([x0, x1, y0, y1, z0, z1])) {
+            *four = w.to_le_bytes();
+        }
+        out
+    }
+
+    /// From the first bytes of a block.
+    ///
+    /// # Errors
+    /// Fewer than [`BlockHead::BYTES`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<BlockHead, Damaged> {
+        let bytes: &[u8; Self::BYTES] = bytes.first_chunk().ok_or(Damaged)?;
+        let word = |k: usize| bytes.as_chunks::<4>().0.get(k).map_or(0, |b| u32::from_le_bytes(*b));
+        Ok(BlockHead {
+            error: f64::from_bits(u64::from(word(0)) | u64::from(word(1)) << 32),
+            collapses: word(2),
+            faces: word(3),
+            faces_left: word(4),
+            columns: [word(5) as i32, word(6) as i32],
+            rows: [word(7) as i32, word(8) as i32],
+            heights: [f32::from_bits(word(9)), f32::from_bits(word(10))],
+        })
+    }
+}
+
 impl Block {
-    /// All but the sheet as bytes.
+    /// All but the sheet as bytes; they begin with its [head](Block::head).
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        let mut out = vec![];
-        out.extend_from_slice(&self.error.to_le_bytes());
-        put(&mut out, &[self.faces]);
+        let mut out = self.head().to_bytes().to_vec();
         put(&mut out, &self.vertices);
         put(&mut out, &self.collapses);
         put(&mut out, &self.vertices_left);
@@ -182,13 +231,12 @@ impl Block {
     /// Bytes that are too short or too long.
     pub fn from_bytes(mut bytes: &[u8]) -> Result<Block, Damaged> {
         let from = &mut bytes;
-        let (error, rest) = from.split_first_chunk().ok_or(Damaged)?;
-        let error = f64::from_le_bytes(*error);
-        *from = rest;
+        let head = BlockHead::from_bytes(from)?;
+        *from = from.get(BlockHead::BYTES..).ok_or(Damaged)?;
         let one = |from: &mut &[u8]| take::<1, u32>(from)?.first().copied().ok_or(Damaged);
         let mut block = Block {
-            error,
-            faces: one(from)?,
+            error: head.error,
+            faces: head.faces,
             vertices: take(from)?,
             collapses: take(from)?,
             vertices_left: take(from)?,
@@ -219,6 +267,7 @@ mod tests {
             assert_eq!(Sheet::from_bytes(&b.sheet.to_bytes()).unwrap(), b.sheet);
             let bytes = b.to_bytes();
             let back = Block::from_bytes(&bytes).unwrap();
+            assert_eq!(BlockHead::from_bytes(&bytes), Ok(b.head()));
             assert_eq!(Block { sheet: b.sheet.clone(), ..back }, *b);
             assert!((0..bytes.len()).step_by(101).all(|n| Block::from_bytes(&bytes[..n]).is_err()));
         }

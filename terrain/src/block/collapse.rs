@@ -1,7 +1,7 @@
 //! Half-edge collapses, the cheapest first by the exact error of the triangles that come of it (Hoppe 1998).
 
 use super::NONE;
-use super::history::History;
+use super::history::{Forms, History, up};
 use super::relief::Relief;
 use super::sheet::{Sheet, Vertex};
 use super::surface::{Ring, Surface, Wing, next, previous};
@@ -23,8 +23,11 @@ pub struct Collapse {
     pub beside: [[u32; 2]; 2],
     /// The bound of its split; see the [module](super). Never less than that of a split that needs it.
     pub bound: f32,
-    /// The radius of a sphere about `kept` for which the bound holds, in steps by a column.
+    /// The radius of a sphere about `kept` for which the bound holds, and which holds the faces of the finest mesh around all vertices that come of it, in steps by a column. Those of splits below it lie
+    /// within, also when they are rounded to 8 bits of mantissa, as they are already.
     pub radius: f32,
+    /// The least cosine of the angle between up and a normal of these faces.
+    pub upright: f32,
 }
 
 /// How far a block is simplified, and what stays.
@@ -38,6 +41,8 @@ pub struct Rules {
     pub vertices: usize,
     /// How long a step by a row and a unit of height are, in steps by a column.
     pub scale: [f64; 2],
+    /// By so much the radius of a split is larger than what it has to hold.
+    pub slack: f64,
 }
 
 impl Rules {
@@ -72,12 +77,29 @@ struct Work<'a> {
     queue: BinaryHeap<Candidate>,
     /// Where each vertex would go; [`NONE`] for nowhere.
     goal: Vec<u32>,
+    /// The error of what would come of it.
+    price: Vec<f32>,
     /// Something around it changed since the goal was found.
     stale: Vec<bool>,
     mark: Vec<u32>,
     stamp: u32,
     ring: Ring,
     other: Ring,
+    star: Star,
+    /// Where vertices must not go as long as nothing around them changes, as some face would turn over in some order of refinement: for each where its list begins, and the lists.
+    barred: Vec<u32>,
+    bars: Vec<(u32, u32)>,
+}
+
+/// The ring of a vertex as seen from it.
+#[derive(Clone, Debug, Default)]
+struct Star {
+    /// Columns and rows from the vertex to its neighbours; the first again behind the last of a closed ring.
+    at: Vec<[i64; 2]>,
+    /// Twice the areas of the faces.
+    areas: Vec<i64>,
+    /// What it takes at least to go to a neighbour, and which.
+    ways: Vec<(f64, usize)>,
 }
 
 /// What collapsing a block gave.
@@ -93,7 +115,7 @@ pub(super) struct Collapsed {
 ///
 /// O(n log n) for n vertices, and the samples of the triangles looked at.
 pub(super) fn collapse(mut sheet: Sheet, relief: &Relief, rules: &Rules) -> Option<Collapsed> {
-    let history = History::new(&mut sheet, rules.scale);
+    let history = History::new(&mut sheet, rules.scale, rules.slack);
     let n = sheet.vertices.len();
     let surface = Surface::new(&sheet.faces, n)?;
     let mut work = Work {
@@ -104,11 +126,15 @@ pub(super) fn collapse(mut sheet: Sheet, relief: &Relief, rules: &Rules) -> Opti
         history,
         queue: BinaryHeap::with_capacity(n),
         goal: vec![NONE; n],
+        price: vec![0.0; n],
         stale: vec![false; n],
         mark: vec![0; n],
         stamp: 0,
         ring: Ring::default(),
         other: Ring::default(),
+        star: Star::default(),
+        barred: vec![NONE; n],
+        bars: vec![],
     };
     work.classify(&sheet.faces, rules);
     let collapses = work.run(n.saturating_sub(rules.vertices));
@@ -128,6 +154,12 @@ pub(super) fn collapse(mut sheet: Sheet, relief: &Relief, rules: &Rules) -> Opti
     };
     history.hand_over(&vertices, &faces, &mut left);
     Some(Collapsed { collapses, vertices, faces, sheet: left })
+}
+
+/// Twice the area of a triangle from the origin to two places.
+#[inline]
+fn cross(a: [i64; 2], b: [i64; 2]) -> i64 {
+    a[0] * b[1] - a[1] * b[0]
 }
 
 impl Work<'_> {
@@ -159,7 +191,7 @@ impl Work<'_> {
             self.evaluate(u, None);
         }
         let mut collapses = vec![];
-        let (mut room, mut inner) = ([vec![], vec![]], vec![]);
+        let (mut forms, mut inner) = (Forms::default(), vec![]);
         while collapses.len() < most {
             let Some(Reverse((cost, _, u))) = self.queue.pop() else { break };
             if self.surface.at[u as usize] == NONE || self.goal[u as usize] == NONE {
@@ -168,29 +200,39 @@ impl Work<'_> {
             if self.stale[u as usize] && !self.evaluate(u, Some(cost)) {
                 continue;
             }
-            collapses.push(self.commit(u, (&mut room, &mut inner)));
+            match self.commit(u, (&mut forms, &mut inner)) {
+                Some(collapse) => collapses.push(collapse),
+                // Elsewhere, perhaps.
+                None => {
+                    let v = std::mem::replace(&mut self.goal[u as usize], NONE);
+                    let list = std::mem::replace(&mut self.barred[u as usize], self.bars.len() as u32);
+                    self.bars.push((v, list));
+                    self.evaluate(u, None);
+                }
+            }
         }
         collapses
     }
 
-    /// Makes the collapse that `u` waits for.
-    fn commit(&mut self, u: u32, (room, inner): (&mut [Vec<Vertex>; 2], &mut Vec<(u32, usize)>)) -> Collapse {
+    /// Makes the collapse that `u` waits for, unless a face would turn over in some order of refinement.
+    fn commit(&mut self, u: u32, (forms, inner): (&mut Forms, &mut Vec<(u32, usize)>)) -> Option<Collapse> {
         let v = self.goal[u as usize];
         let mut ring = std::mem::take(&mut self.ring);
         self.surface.ring(u, &mut ring);
         // The goal was found on this very ring.
         let i = ring.neighbours.iter().position(|&n| n == v).unwrap_or(0);
         History::inner(&ring, i, inner);
+        let surface = (&self.surface, self.vertices);
+        if !self.history.propose(surface, (u, i), (&ring, inner), forms) {
+            self.ring = ring;
+            return None;
+        }
+        let j = self.history.accept(self.relief, self.vertices, [u, v], self.price[u as usize], forms);
         let wings = self.surface.collapse(u, i, &ring);
-        let dying = wings.into_iter().flatten().map(|w| w.side / 3);
-        let way = self.history.distance(self.vertices[u as usize], self.vertices[v as usize]);
-        let j = self.history.begin(u, v, dying, way);
         let [from, to] = [u, v].map(|v| self.vertices[v as usize]);
-        self.history.measure_gone(self.relief, to, inner, j, room);
         self.history.bury(wings, from, to);
         for &side in &ring.sides {
             if self.surface.corner[side as usize] != NONE {
-                self.history.measure_face(self.relief, &self.surface, self.vertices, side, j, room);
                 self.history.note(side, from, j);
             }
         }
@@ -202,6 +244,7 @@ impl Work<'_> {
         self.goal[u as usize] = NONE;
         // What has a goal is looked at again when its turn comes, what has none at once: it may have one now.
         for &n in ring.neighbours.iter().chain([&v]) {
+            self.barred[n as usize] = NONE;
             if self.goal[n as usize] != NONE {
                 self.stale[n as usize] = true;
             } else {
@@ -209,15 +252,16 @@ impl Work<'_> {
             }
         }
         self.ring = ring;
-        let [bound, radius] = self.history.bound(j);
-        Collapse {
+        let [bound, radius, upright] = self.history.bounds(v, j);
+        Some(Collapse {
             kept: v,
             removed: u,
             wings: wings.map(|w| w.map_or(NONE, |w| w.side)),
             beside: wings.map(|w: Option<Wing>| w.map_or([NONE; 2], |w| [w.kept, w.removed])),
             bound,
             radius,
-        }
+            upright,
+        })
     }
 
     /// Finds where `u` goes at the least cost, and puts it into the queue. But if it still goes where it was to go for at most `known`, bits of the cost that is the least of all, it
@@ -232,61 +276,141 @@ impl Work<'_> {
         self.surface.ring(u, &mut ring);
         self.stamp += 1;
         ring.neighbours.iter().for_each(|&n| self.mark[n as usize] = self.stamp);
+        self.look(u, &ring);
+        let at_once = self.choose(u, before, known, &ring);
+        self.other = ring;
+        at_once
+    }
+
+    /// As [`Work::evaluate`], with its ring looked at.
+    fn choose(&mut self, u: u32, before: u32, known: Option<u32>, ring: &Ring) -> bool {
         let (mut best, mut found) = ((f64::INFINITY, u32::MAX), NONE);
         // What was the best before is so again more often than not, and spares most of the work for the others.
-        let first = ring.neighbours.iter().position(|&n| n == before).unwrap_or(0);
-        let n = ring.neighbours.len();
-        for i in (first..n).chain(0..first) {
-            if let Some(cost) = self.cost(u, i, &ring, best.0)
+        let first = ring.neighbours.iter().position(|&n| n == before);
+        if let Some(i) = first
+            && self.least(u, i, ring).is_some()
+            && let Some(cost) = self.cost(u, i, ring, f64::INFINITY)
+        {
+            (best, found) = (cost, before);
+            if known.is_some_and(|k| (cost.0 as f32).to_bits() <= k) {
+                self.goal[u as usize] = found;
+                self.price[u as usize] = up(cost.0);
+                return true;
+            }
+        }
+        // The others by what they cost at least: most need not be measured.
+        let mut ways = std::mem::take(&mut self.star.ways);
+        ways.clear();
+        for i in (0..ring.neighbours.len()).filter(|&i| Some(i) != first) {
+            ways.extend(self.least(u, i, ring).filter(|&least| least <= best.0).map(|least| (least, i)));
+        }
+        ways.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for &(least, i) in &ways {
+            if least > best.0 {
+                break;
+            }
+            if let Some(cost) = self.cost(u, i, ring, best.0)
                 && (cost, ring.neighbours[i]) < (best, found)
             {
                 (best, found) = (cost, ring.neighbours[i]);
-                if found == before && known.is_some_and(|k| (cost.0 as f32).to_bits() <= k) {
-                    self.goal[u as usize] = found;
-                    self.other = ring;
-                    return true;
-                }
             }
         }
-        self.other = ring;
+        self.star.ways = ways;
         if found != NONE {
             self.goal[u as usize] = found;
+            self.price[u as usize] = up(best.0);
             self.queue.push(Reverse(((best.0 as f32).to_bits(), best.1, u)));
         }
         false
     }
 
-    /// Error and squared length of taking `u` to its neighbour number `i`; `None` if that is not legal, or dearer than `enough`.
+    /// Looks at the ring of `u` from there.
+    fn look(&mut self, u: u32, ring: &Ring) {
+        let here = self.vertices[u as usize];
+        let Star { at, areas, .. } = &mut self.star;
+        let place = |&n: &u32| {
+            let v = self.vertices[n as usize];
+            [i64::from(v.x) - i64::from(here.x), i64::from(v.y) - i64::from(here.y)]
+        };
+        at.clear();
+        at.extend(ring.neighbours.iter().map(place));
+        if !ring.border {
+            at.extend_from_within(..1);
+        }
+        areas.clear();
+        areas.extend(at.windows(2).map(|w| cross(w[0], w[1])));
+    }
+
+    /// The faces that stay when `u` goes to neighbour number `i`, in turn.
+    fn staying(ring: &Ring, i: usize) -> impl Iterator<Item = usize> + use<> {
+        let faces = ring.sides.len();
+        // Those behind the one that begins at the neighbour, and before the one that ends there.
+        let (first, count) = match (ring.border, i) {
+            (true, 0) => (1, faces.saturating_sub(1)),
+            (true, _) => (0, faces.saturating_sub(1)),
+            (false, _) => (i + 1, faces.saturating_sub(2)),
+        };
+        (first..first + count).map(move |k| if k >= faces { k - faces } else { k })
+    }
+
+    /// Whether `u` must not go to `v` for the time being.
+    fn is_barred(&self, u: u32, v: u32) -> bool {
+        let mut at = self.barred[u as usize];
+        while let Some(&(to, next)) = self.bars.get(at as usize) {
+            if to == v {
+                return true;
+            }
+            at = next;
+        }
+        false
+    }
+
+    /// The error at `u` itself if it goes to its neighbour number `i`; `None` if it must not, as far as faces tell that.
+    fn least(&self, u: u32, i: usize, ring: &Ring) -> Option<f64> {
+        let v = ring.neighbours[i];
+        if self.kind[v as usize] == Kind::Locked || self.is_barred(u, v) {
+            return None;
+        }
+        let Star { at, areas, .. } = &self.star;
+        let to = at[i];
+        let n = ring.neighbours.len();
+        // Along the border only, and straight on.
+        if ring.border && ((i > 0 && i < n - 1) || cross(at[n - 1 - i], to) != 0) {
+            return None;
+        }
+        let height = |k: usize| f64::from(self.vertices[ring.neighbours[k] as usize].z);
+        let mut least = 0.0;
+        for k in Self::staying(ring, i) {
+            let (b, c) = (cross(to, at[k]), cross(to, at[k + 1]));
+            let area = areas[k] + b - c;
+            if area <= 0 {
+                return None;
+            }
+            // Where the vertex lies in this face; weights are the areas opposite the corners.
+            if b >= 0 && c <= 0 {
+                let next = if k + 1 == n { 0 } else { k + 1 };
+                let sum = areas[k] as f64 * height(i) - c as f64 * height(k) + b as f64 * height(next);
+                least = (sum / area as f64 - f64::from(self.vertices[u as usize].z)).abs();
+            }
+        }
+        Some(least)
+    }
+
+    /// Error and squared length of taking `u` to its neighbour number `i`, where faces allow that; `None` if it is not legal, or dearer than `enough`.
     fn cost(&self, u: u32, i: usize, ring: &Ring, enough: f64) -> Option<(f64, u32)> {
         let v = ring.neighbours[i];
         let (at, to) = (self.vertices[u as usize], self.vertices[v as usize]);
         let n = ring.neighbours.len();
-        if self.kind[v as usize] == Kind::Locked {
-            return None;
-        }
-        let wings = if ring.border && (i == 0 || i == n - 1) { 1 } else { 2 };
-        if ring.border {
-            // Along the border only, and straight on.
-            let other = self.vertices[ring.neighbours[if i == 0 { n - 1 } else { 0 }] as usize];
-            if wings == 2 || area((other.x, other.y), (at.x, at.y), (to.x, to.y)) != 0 {
-                return None;
-            }
-        }
-        let place = |k: usize| self.vertices[ring.neighbours[k % n] as usize];
-        let faces = ring.sides.len();
-        let others = || (0..faces).filter(|&k| k != i && (k + 1) % n != i);
+        let place = |k: usize| self.vertices[ring.neighbours[if k == n { 0 } else { k }] as usize];
         let mut most = 0.0f64;
-        for k in others() {
-            let (b, c) = (place(k), place(k + 1));
-            if area((to.x, to.y), (b.x, b.y), (c.x, c.y)) <= 0 {
-                return None;
-            }
-            most = most.max(self.relief.error([to, b, c], enough));
+        for k in Self::staying(ring, i) {
+            most = most.max(self.relief.error([to, place(k), place(k + 1)], enough));
             if most > enough {
                 return None;
             }
         }
         // Last, as most are too dear.
+        let wings = if ring.border { 1 } else { 2 };
         if !self.links(v, wings, ring.sides.len()) {
             return None;
         }

@@ -2,8 +2,9 @@
 
 use super::NONE;
 use super::relief::Relief;
-use super::sheet::{Former, Gone, Sheet, Vertex};
+use super::sheet::{Former, Gone, Round, Sheet, Vertex, square};
 use super::surface::{Ring, Surface, Wing, next, previous};
+use crate::tin::scan::area;
 
 /// A face that a collapse took away, as it is right after the split that brings it back, but for its tip: that may be coarser than the collapse found it, as nothing of it
 /// is needed for the split. The next collapse that takes the tip elsewhere has to measure it.
@@ -27,13 +28,48 @@ pub(super) struct History {
     /// What every collapse, those of the past first, needs as a split, as far as it is known yet.
     needs: Vec<[u32; 3]>,
     bounds: Vec<f32>,
-    radii: Vec<f32>,
+    /// Of every vertex: what holds all that came of it and is around that, and how steep that is; see [`Round`].
+    round: Vec<Round>,
     /// Lists of faces that went, along the edge that their two other sides have become: for every side those with the tip where it begins, and where it ends. Those of an edge are
     /// at either of its sides. A face is forgotten as soon as its split needs whatever takes its tip away next.
     open: Vec<[u32; 2]>,
     stills: Vec<Still>,
     /// How long a step by a row and a unit of height are, in steps by a column.
     scale: [f64; 2],
+    /// What radii grow by along the vertex hierarchy, so that rounding of places never shows.
+    slack: f64,
+}
+
+/// What the faces may be about a vertex that goes to a neighbour: triangles with a corner there, and the others where they are or were as long as the split is not made.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Forms {
+    /// Splits that need that of the collapse.
+    users: [u32; 8],
+    /// Of every face the places of its second corner, the present first, then those of its third.
+    at: Vec<Vertex>,
+    /// Where both end.
+    ends: Vec<[u32; 2]>,
+    /// So many faces are there; the others went.
+    live: usize,
+}
+
+impl Forms {
+    fn faces(&self) -> impl Iterator<Item = [&[Vertex]; 2]> {
+        let mut start = 0;
+        self.ends.iter().map(move |&[middle, end]| {
+            let of = [&self.at[start..middle as usize], &self.at[middle as usize..end as usize]];
+            start = end as usize;
+            of
+        })
+    }
+
+    /// Whether all lie the right way round with their first corner at `a`.
+    fn turn_about(&self, a: Vertex) -> bool {
+        let at = |v: &Vertex| (v.x, v.y);
+        self.faces().all(|[second, third]| {
+            second.iter().all(|b| third.iter().all(|c| area(at(&a), at(b), at(c)) > 0))
+        })
+    }
 }
 
 /// How deep dependencies are followed. Deeper they would rule out a few more triangles: bounds are a little larger than they might be.
@@ -42,15 +78,16 @@ const DEPTH: u32 = 3;
 const MOST: usize = 1024;
 
 impl History {
-    pub(super) fn new(sheet: &mut Sheet, scale: [f64; 2]) -> Self {
+    pub(super) fn new(sheet: &mut Sheet, scale: [f64; 2], slack: f64) -> Self {
         let mut h = History {
             scale,
+            slack,
             head: Vec::with_capacity(3 * sheet.faces.len()),
             joined: std::mem::take(&mut sheet.joined).into_flattened(),
             last: std::mem::take(&mut sheet.last),
             needs: vec![[NONE; 3]; sheet.past.len()],
-            bounds: sheet.past.iter().map(|p| p[0]).collect(),
-            radii: sheet.past.iter().map(|p| p[1]).collect(),
+            bounds: std::mem::take(&mut sheet.past),
+            round: std::mem::take(&mut sheet.round),
             ..History::default()
         };
         h.entries.reserve(sheet.former.len());
@@ -72,7 +109,6 @@ impl History {
             }
             h.open.push(lists);
         }
-        sheet.past.clear();
         h
     }
 
@@ -87,13 +123,6 @@ impl History {
             }
             None => NONE,
         }
-    }
-
-    /// Between two vertices, heights included, in steps by a column.
-    pub(super) fn distance(&self, a: Vertex, b: Vertex) -> f64 {
-        let (x, y) = (f64::from(a.x - b.x), f64::from(a.y - b.y) * self.scale[0]);
-        let z = (f64::from(a.z) - f64::from(b.z)) * self.scale[1];
-        (x * x + y * y + z * z).sqrt()
     }
 
     /// Split `i` needs `j`.
@@ -112,30 +141,117 @@ impl History {
             || depth > 0 && self.needs[i as usize].iter().any(|&d| d != NONE && self.depends(d, j, depth - 1))
     }
 
-    /// The collapse after the last: `u` goes onto `v`, the faces of `dying` go. Returns its number; its bound begins with those of the splits that need it.
-    pub(super) fn begin(&mut self, u: u32, v: u32, dying: impl Iterator<Item = u32>, distance: f64) -> u32 {
+    /// Looks at what comes of a collapse of `u` to its neighbour number `i`, before it is made; `ring` is that of `u`, `inner` its sides that stay. True, and its split is noted as the next, if all faces lie the
+    /// right way round then, in whatever order collapses are undone. `forms` gets the triangles that they may be.
+    pub(super) fn propose(
+        &mut self,
+        (surface, vertices): (&Surface, &[Vertex]),
+        (u, i): (u32, usize),
+        (ring, inner): (&Ring, &[(u32, usize)]),
+        forms: &mut Forms,
+    ) -> bool {
+        let (n, faces) = (ring.neighbours.len(), ring.sides.len());
+        let v = ring.neighbours[i];
+        let dies = |k: usize| k == i || (k + 1) % n == i;
+        // The splits that need this one: the last at both vertices, and those that joined the faces beside the two that go.
+        let joined = |k: usize| {
+            let f = ring.sides[k] / 3 * 3;
+            [0, 1, 2].map(|s| self.joined[(f + s) as usize])
+        };
+        let mut dying = (0..faces).filter(|&k| dies(k)).map(joined);
+        let [[a, b, c], [d, e, f]] = [(); 2].map(|()| dying.next().unwrap_or([NONE; 3]));
+        forms.users = [self.last[v as usize], self.last[u as usize], a, b, c, d, e, f];
         let j = self.needs.len() as u32;
         self.needs.push([NONE; 3]);
-        let (mut bound, mut radius) = (0.0f32, up(distance));
-        let before = [self.last[v as usize], self.last[u as usize]];
-        for (i, way) in before.into_iter().zip([0.0, distance]).filter(|(i, _)| *i != NONE) {
-            radius = radius.max(up(f64::from(self.radii[i as usize]) + way));
-            bound = bound.max(self.bounds[i as usize]);
-            self.need(i, j);
+        forms.users.into_iter().for_each(|i| self.need(i, j));
+        self.fill((surface, vertices), (ring, inner), dies, j, forms);
+        if forms.turn_about(vertices[v as usize]) {
+            return true;
         }
-        for f in dying {
-            for s in 3 * f..3 * f + 3 {
-                let i = self.joined[s as usize];
-                if i != NONE {
-                    bound = bound.max(self.bounds[i as usize]);
-                    self.need(i, j);
+        for i in forms.users.into_iter().filter(|&i| i != NONE) {
+            self.needs[i as usize].iter_mut().filter(|s| **s == j).for_each(|s| *s = NONE);
+        }
+        self.needs.pop();
+        false
+    }
+
+    /// Lists what the faces may be that stay when split `j` is not made.
+    fn fill(
+        &self,
+        (surface, vertices): (&Surface, &[Vertex]),
+        (ring, inner): (&Ring, &[(u32, usize)]),
+        dies: impl Fn(usize) -> bool,
+        j: u32,
+        forms: &mut Forms,
+    ) {
+        forms.at.clear();
+        forms.ends.clear();
+        let add = |forms: &mut Forms, others: [(Vertex, u32); 2]| {
+            let ends = others.map(|(v, head)| {
+                forms.at.push(v);
+                if head != NONE {
+                    self.chain(head, j, &mut forms.at);
+                }
+                forms.at.len() as u32
+            });
+            forms.ends.push(ends);
+        };
+        for (_, &side) in ring.sides.iter().enumerate().filter(|(k, _)| !dies(*k)) {
+            let corner = |s: u32| (vertices[surface.corner[s as usize] as usize], self.head[s as usize]);
+            add(forms, [corner(next(side)), corner(previous(side))]);
+        }
+        forms.live = forms.ends.len();
+        // Faces that went, and have their tip at the vertex.
+        for &(side, end) in inner {
+            let mut at = self.open[side as usize][end];
+            while let Some(&Still { at: [b, c], chains, next }) = self.stills.get(at as usize) {
+                add(forms, [(b, chains[0]), (c, chains[1])]);
+                at = next;
+            }
+        }
+    }
+
+    /// Makes the collapse that was proposed, of `u` to `v`: what comes of it is within `error`, as the faces are now. Measures what else they may be.
+    pub(super) fn accept(
+        &mut self,
+        relief: &Relief,
+        vertices: &[Vertex],
+        [u, v]: [u32; 2],
+        error: f32,
+        forms: &Forms,
+    ) -> u32 {
+        let j = self.bounds.len() as u32;
+        let users = forms.users.iter().filter(|&&i| i != NONE);
+        let below = users.map(|&i| self.bounds[i as usize]).fold(error, f32::max);
+        let mut most = f64::from(below);
+        let (a, mut far) = (vertices[v as usize], 0.0f64);
+        for (k, [second, third]) in forms.faces().enumerate() {
+            far = second.iter().chain(third).map(|&b| square(a, b, self.scale)).fold(far, f64::max);
+            if second.len() * third.len() > MOST {
+                most = most.max(relief.span(second.iter().chain(third).copied().chain([a])));
+                continue;
+            }
+            for (i, &b) in second.iter().enumerate() {
+                let skip = usize::from(k < forms.live && i == 0);
+                for &c in &third[skip..] {
+                    most = most.max(relief.error([a, b, c], f64::INFINITY));
                 }
             }
         }
+        self.bounds.push(up(most));
+        let way = square(a, vertices[u as usize], self.scale).sqrt();
+        let (gone, kept) = (self.round[u as usize], self.round[v as usize]);
+        let reach = f64::from(kept.reach).max(way + f64::from(gone.reach)) + self.slack;
+        self.round[v as usize] =
+            Round { reach: stored(up(reach.max(far.sqrt()))), upright: kept.upright.min(gone.upright) };
         (self.last[v as usize], self.last[u as usize]) = (j, NONE);
-        self.bounds.push(bound);
-        self.radii.push(radius);
         j
+    }
+
+    /// Bound, radius, and the least cosine between a normal of the finest mesh and up, of the collapse `j` onto `v` that was the last there.
+    pub(super) fn bounds(&self, v: u32, j: u32) -> [f32; 3] {
+        let round = &self.round[v as usize];
+        [self.bounds[j as usize], round.reach, round.upright]
     }
 
     /// The vertices that a corner was, the latest first, as long as that does not take split `j`.
@@ -147,70 +263,6 @@ impl History {
             }
             out.push(former.vertex);
             at = *rest;
-        }
-    }
-
-    /// Measures what a face may be as long as split `j` is not made: a corner at `a`, the others where they are or were.
-    fn measure(
-        &mut self,
-        relief: &Relief,
-        a: Vertex,
-        others: [(Vertex, u32); 2],
-        j: u32,
-        room: &mut [Vec<Vertex>; 2],
-    ) {
-        for ((v, head), out) in others.into_iter().zip(room.iter_mut()) {
-            out.clear();
-            out.push(v);
-            self.chain(head, j, out);
-        }
-        let mut most = self.bounds[j as usize];
-        let all = room.iter().flatten();
-        let radius = all.clone().map(|&b| self.distance(a, b)).fold(0.0, f64::max);
-        if room[0].len() * room[1].len() > MOST {
-            most = most.max(up(relief.span(all.copied().chain([a]))));
-        } else {
-            for &b in &room[0] {
-                for &c in &room[1] {
-                    most = most.max(up(relief.error([a, b, c], f64::INFINITY)));
-                }
-            }
-        }
-        self.bounds[j as usize] = most;
-        let known = &mut self.radii[j as usize];
-        *known = known.max(up(radius));
-    }
-
-    /// Measures the face of `side`, which begins at the vertex that collapse `j` keeps.
-    pub(super) fn measure_face(
-        &mut self,
-        relief: &Relief,
-        surface: &Surface,
-        vertices: &[Vertex],
-        side: u32,
-        j: u32,
-        room: &mut [Vec<Vertex>; 2],
-    ) {
-        let here = |s: u32| vertices[surface.corner[s as usize] as usize];
-        let others = [next(side), previous(side)].map(|s| (here(s), self.head[s as usize]));
-        self.measure(relief, here(side), others, j, room);
-    }
-
-    /// Measures the faces that went and have their tip at the vertex that collapse `j` takes to `v`; `inner` are the sides that begin or end there, of edges that stay.
-    pub(super) fn measure_gone(
-        &mut self,
-        relief: &Relief,
-        v: Vertex,
-        inner: &[(u32, usize)],
-        j: u32,
-        room: &mut [Vec<Vertex>; 2],
-    ) {
-        for &(side, end) in inner {
-            let mut at = self.open[side as usize][end];
-            while let Some(&Still { at: [b, c], chains, next }) = self.stills.get(at as usize) {
-                self.measure(relief, v, [(b, chains[0]), (c, chains[1])], j, room);
-                at = next;
-            }
         }
     }
 
@@ -273,11 +325,6 @@ impl History {
         *head = self.entries.len() as u32 - 1;
     }
 
-    /// Bound and radius of a collapse.
-    pub(super) fn bound(&self, j: u32) -> [f32; 2] {
-        [self.bounds[j as usize], self.radii[j as usize]]
-    }
-
     /// Gives a sheet that has the vertices and faces of these numbers its past.
     pub(super) fn hand_over(&self, vertices: &[u32], faces: &[u32], sheet: &mut Sheet) {
         let mut new = vec![NONE; self.needs.len()];
@@ -289,11 +336,12 @@ impl History {
             let n = &mut new[i as usize];
             if *n == NONE {
                 *n = past.len() as u32;
-                past.push(self.bound(i));
+                past.push(self.bounds[i as usize]);
             }
             *n
         };
         sheet.last = vertices.iter().map(|&v| id(self.last[v as usize])).collect();
+        sheet.round = vertices.iter().map(|&v| self.round[v as usize]).collect();
         let mut chain = |head: u32, out: &mut Vec<Former>| {
             let (mut at, mut count) = (head, 0);
             while let Some((former, rest)) = self.entries.get(at as usize) {
@@ -325,6 +373,11 @@ impl History {
         }
         sheet.past = past;
     }
+}
+
+/// The least number of 8 bits of mantissa, as bounds are stored with, that is not below a positive one: so what nests as it is nests as it is stored.
+pub(super) fn stored(x: f32) -> f32 {
+    f32::from_bits(x.to_bits().div_ceil(1 << 15) << 15)
 }
 
 /// The least f32 that is not below a number.

@@ -37,7 +37,46 @@ pub struct Block {
     pub error: f64,
 }
 
+/// What is known of a block without its parts: it stands before them in its bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlockHead {
+    /// How many collapses it has.
+    pub collapses: u32,
+    /// The faces it began with, and those left: so many.
+    pub faces: u32,
+    /// See [`BlockHead::faces`].
+    pub faces_left: u32,
+    /// As [`Block::error`].
+    pub error: f64,
+    /// The first and the last column of its vertices; the first is the larger if there is none.
+    pub columns: [i32; 2],
+    /// The same of rows.
+    pub rows: [i32; 2],
+    /// The same of heights.
+    pub heights: [f32; 2],
+}
+
 impl Block {
+    /// What is known without its parts.
+    #[must_use]
+    pub fn head(&self) -> BlockHead {
+        let (x0, x1) = extent(self.vertices.iter().map(|v| v.x));
+        let (y0, y1) = extent(self.vertices.iter().map(|v| v.y));
+        let heights = self
+            .vertices
+            .iter()
+            .fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], v| [low.min(v.z), high.max(v.z)]);
+        BlockHead {
+            collapses: self.collapses.len() as u32,
+            faces: self.faces,
+            faces_left: self.faces_left.len() as u32,
+            error: self.error,
+            columns: [x0, x1],
+            rows: [y0, y1],
+            heights,
+        }
+    }
+
     pub(super) fn new(vertices: Vec<Vertex>, made: Collapsed, children: Vec<Child>, error: f64) -> Self {
         let faces = made.faces.len()
             + made.collapses.iter().map(|c| c.wings.iter().filter(|&&w| w != NONE).count()).sum::<usize>();

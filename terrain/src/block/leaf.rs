@@ -14,6 +14,8 @@ pub struct Layout {
     rows: usize,
     cells: usize,
     scale: [f64; 2],
+    /// What radii are enlarged by.
+    slack: f64,
 }
 
 /// Why a block was not made.
@@ -46,6 +48,7 @@ impl Layout {
             rows,
             cells,
             scale: [1.0; 2],
+            slack: 0.0,
         })
     }
 
@@ -53,6 +56,13 @@ impl Layout {
     #[must_use]
     pub fn with_scale(mut self, scale: [f64; 2]) -> Self {
         self.scale = scale;
+        self
+    }
+
+    /// With this slack of radii ([`Rules::slack`]); 0 by default.
+    #[must_use]
+    pub fn with_slack(mut self, slack: f64) -> Self {
+        self.slack = slack;
         self
     }
 
@@ -99,6 +109,7 @@ impl Layout {
             shared: [w.column > 0, x + 1 < self.columns, w.row > 0, y + 1 < self.rows],
             vertices,
             scale: self.scale,
+            slack: self.slack,
         }
     }
 }
@@ -141,7 +152,8 @@ pub fn leaf(raster: &dyn Raster, layout: &Layout, at: [usize; 2], floor: f64) ->
         .iter()
         .map(|t| relief.error(t.map(|v| vertices[v as usize]), f64::INFINITY))
         .fold(0.0, f64::max);
-    let made = collapse(Sheet::new(vertices, faces), &relief, &rules).ok_or(BlockError::NoNeighbours)?;
+    let made = collapse(Sheet::new(vertices, faces, rules.scale), &relief, &rules)
+        .ok_or(BlockError::NoNeighbours)?;
     // Insertion has kept the floor in integers; what was measured has an allowance for the arithmetic.
     let error = if floor > 0.0 { error.min(floor) } else { error };
     Ok(Block::new(started, made, vec![], error))

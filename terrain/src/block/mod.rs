@@ -11,9 +11,9 @@
 //! of a face is one of a chain of vertices, each brought by the next of the splits that change this corner. Of the splits that come next at the three corners of a face, let `j` be the coarsest.
 //! Then the corner that `j` would change is as `j` finds it, and both others are as `j` finds them or finer. All these triangles are measured against the grid's samples
 //! when `j` is recorded, but for those that would need `j` itself. So what a face deviates from the samples over or under it is at most the bound of a split that was not made, and a
-//! face of which no corner can change is one of the finest mesh. All of it holds for faces that lie the wrong way round, too. A sphere about the vertex of `j` holds all the triangles measured. Bounds and spheres nest along the vertex hierarchy.
+//! face of which no corner can change is one of the finest mesh. A sphere about the vertex of `j` holds all the triangles measured. Bounds and spheres nest along the vertex hierarchy.
 //!
-//! Not proven: that no order of refinement turns a face over in the plan.
+//! **No face turns over** in the plan, whatever the order: a collapse is made only if all the triangles that are measured for it lie the right way round. So every mesh of the hierarchy is a triangulation of the valid region.
 
 mod bytes;
 mod collapse;
@@ -26,7 +26,7 @@ mod surface;
 
 pub use bytes::Damaged;
 pub use collapse::{Collapse, Rules};
-pub use join::{Block, Child, join};
+pub use join::{Block, BlockHead, Child, join};
 pub use leaf::{BlockError, Layout, leaf};
 pub use relief::Relief;
 pub use sheet::{Sheet, Vertex};

@@ -1,7 +1,7 @@
 //! Heights that triangles are measured against.
 
 use super::Vertex;
-use crate::tin::scan::rows;
+use crate::tin::scan::{rows, rows_between_corners};
 use crate::{Raster, RasterError, Window};
 
 /// The heights of a window of a grid, or of a wide one the least and greatest of every square of samples.
@@ -103,8 +103,9 @@ impl Relief {
             return if self.rounding > 0.0 && area != 0 { self.rounding } else { 0.0 };
         }
         let (uz, vz) = (f64::from(b.z) - f64::from(a.z), f64::from(c.z) - f64::from(a.z));
-        let dx = (uz * vy as f64 - vz * uy as f64) / area as f64;
-        let dy = (ux as f64 * vz - vx as f64 * uz) / area as f64;
+        let part = 1.0 / area as f64;
+        let dx = (uz * vy as f64 - vz * uy as f64) * part;
+        let dy = (ux as f64 * vz - vx as f64 * uz) * part;
         let (b, c) = if area < 0 { (c, b) } else { (b, c) };
         let z = f64::from(a.z);
         let most = if self.cell == 1 {
@@ -137,30 +138,24 @@ impl Relief {
     #[allow(clippy::too_many_arguments)]
     fn fine(&self, a: Vertex, b: Vertex, c: Vertex, z: f64, dx: f64, dy: f64, enough: f64) -> f64 {
         let mut most = 0.0f64;
-        rows((a.x, a.y), (b.x, b.y), (c.x, c.y), |y, x0, x1| {
+        // Corners are samples themselves.
+        rows_between_corners((a.x, a.y), (b.x, b.y), (c.x, c.y), |y, x0, x1| {
             if most > enough {
                 return;
             }
             let from = (y - self.row) as usize * self.across + (x0 - self.column) as usize;
             let heights = &self.low[from..=from + (x1 - x0) as usize];
-            let start = z + dx * f64::from(x0 - a.x) + dy * f64::from(y - a.y);
-            let mut lanes = [0.0f64; 4];
-            let (chunks, rest) = heights.as_chunks::<4>();
-            let mut at = 0.0;
-            for chunk in chunks {
-                for (k, lane) in lanes.iter_mut().enumerate() {
-                    let e = (start + dx * (at + k as f64) - f64::from(chunk[k])).abs();
-                    // Void samples compare as nothing.
-                    *lane = if e > *lane { e } else { *lane };
+            let mut at = z + dx * f64::from(x0 - a.x) + dy * f64::from(y - a.y);
+            // Void samples compare as nothing.
+            if heights.len() < 2 * LANES {
+                for &h in heights {
+                    let e = (at - f64::from(h)).abs();
+                    most = if e > most { e } else { most };
+                    at += dx;
                 }
-                at += 4.0;
+            } else {
+                most = most.max(long_row(heights, at, dx));
             }
-            for &h in rest {
-                let e = (start + dx * at - f64::from(h)).abs();
-                most = if e > most { e } else { most };
-                at += 1.0;
-            }
-            most = lanes.into_iter().fold(most, f64::max);
         });
         most
     }
@@ -201,6 +196,31 @@ impl Relief {
         }
         most
     }
+}
+
+/// Samples of a row looked at together.
+const LANES: usize = 4;
+
+/// The greatest distance of samples in a row from a line that is at `start` over the first, and rises by `step` from one to the next.
+#[inline(never)]
+fn long_row(heights: &[f32], start: f64, step: f64) -> f64 {
+    let mut lanes = [0.0f64; LANES];
+    let (chunks, rest) = heights.as_chunks::<LANES>();
+    let mut at = 0.0;
+    for chunk in chunks {
+        for (k, lane) in lanes.iter_mut().enumerate() {
+            let e = (start + step * (at + k as f64) - f64::from(chunk[k])).abs();
+            *lane = if e > *lane { e } else { *lane };
+        }
+        at += LANES as f64;
+    }
+    let mut most = lanes.into_iter().fold(0.0, f64::max);
+    for &h in rest {
+        let e = (start + step * at - f64::from(h)).abs();
+        most = if e > most { e } else { most };
+        at += 1.0;
+    }
+    most
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! What is left of a block: its triangles, and as much of their past as bounds need.
 
 use super::NONE;
+use super::history::up;
 
 /// A vertex: a sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -11,6 +12,31 @@ pub struct Vertex {
     pub y: i32,
     /// Height, as it is written.
     pub z: f32,
+}
+
+/// What came of a vertex, in the finest mesh: its own fan and those of all vertices that went onto it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Round {
+    /// The radius of a sphere about the vertex that holds these faces, and all that was measured for bounds.
+    pub reach: f32,
+    /// The least cosine of the angle between one of their normals and up.
+    pub upright: f32,
+}
+
+impl Round {
+    /// Nothing yet.
+    const NONE: Round = Round { reach: 0.0, upright: 1.0 };
+
+    fn join(self, other: Round) -> Round {
+        Round { reach: self.reach.max(other.reach), upright: self.upright.min(other.upright) }
+    }
+}
+
+/// The square of the distance between two vertices, heights included, in steps by a column.
+pub(super) fn square(a: Vertex, b: Vertex, scale: [f64; 2]) -> f64 {
+    let (x, y) = (f64::from(a.x - b.x), f64::from(a.y - b.y) * scale[0]);
+    let z = (f64::from(a.z) - f64::from(b.z)) * scale[1];
+    x * x + y * y + z * z
 }
 
 /// A vertex that a corner of a face had before a collapse took it to another.
@@ -40,6 +66,8 @@ pub struct Sheet {
     pub(super) joined: Vec<[u32; 3]>,
     /// The last collapse onto each vertex, or [`NONE`].
     pub(super) last: Vec<u32>,
+    /// Of every vertex.
+    pub(super) round: Vec<Round>,
     /// How many former vertices each corner has.
     pub(super) counts: Vec<[u32; 3]>,
     /// How many faces that went are remembered along each side, with their tip where it begins, and where it ends.
@@ -48,14 +76,32 @@ pub struct Sheet {
     pub(super) gone: Vec<Gone>,
     /// Former vertices, the latest first: of all corners of all faces, then of those that went.
     pub(super) former: Vec<Former>,
-    /// Of the collapses that the above name: bounds and radii.
-    pub(super) past: Vec<[f32; 2]>,
+    /// Of the collapses that the above name: bounds.
+    pub(super) past: Vec<f32>,
 }
 
 impl Sheet {
-    /// A sheet without a past.
-    pub(super) fn new(vertices: Vec<Vertex>, faces: Vec<[u32; 3]>) -> Self {
+    /// A sheet without a past: faces of the finest mesh.
+    pub(super) fn new(vertices: Vec<Vertex>, faces: Vec<[u32; 3]>, scale: [f64; 2]) -> Self {
+        let mut round = vec![Round::NONE; vertices.len()];
+        for f in &faces {
+            let [a, b, c] = f.map(|v| vertices[v as usize]);
+            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| square(p, q, scale));
+            let [u, v] = [b, c].map(|p| {
+                let z = (f64::from(p.z) - f64::from(a.z)) * scale[1];
+                [f64::from(p.x - a.x), f64::from(p.y - a.y) * scale[0], z]
+            });
+            let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+            // Rounded down, and well so.
+            let upright = (normal[2] / length) as f32 - 1e-6;
+            for (v, far) in f.iter().zip([ab.max(ca), ab.max(bc), bc.max(ca)]) {
+                let own = &mut round[*v as usize];
+                *own = own.join(Round { reach: up(far.sqrt()), upright });
+            }
+        }
         Sheet {
+            round,
             joined: vec![[NONE; 3]; faces.len()],
             counts: vec![[0; 3]; faces.len()],
             open: vec![[[0; 2]; 3]; faces.len()],
@@ -70,13 +116,15 @@ impl Sheet {
     pub(super) fn append(&mut self, other: Sheet, map: &[u32]) {
         let shift = self.past.len() as u32;
         let id = |i: u32| if i == NONE { NONE } else { i + shift };
-        for ((v, last), &to) in other.vertices.into_iter().zip(other.last).zip(map) {
+        for (((v, last), round), &to) in other.vertices.into_iter().zip(other.last).zip(other.round).zip(map)
+        {
             if to as usize == self.vertices.len() {
                 self.vertices.push(v);
                 self.last.push(id(last));
-            } else if let Some(known) = self.last.get_mut(to as usize).filter(|known| **known == NONE) {
-                // Of shared vertices neither has one: borders are not collapsed onto.
-                *known = id(last);
+                self.round.push(round);
+            } else if let Some(known) = self.round.get_mut(to as usize) {
+                // Nothing was collapsed onto shared vertices.
+                *known = known.join(round);
             }
         }
         let own: usize = self.counts.as_flattened().iter().map(|&c| c as usize).sum();

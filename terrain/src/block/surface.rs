@@ -64,18 +64,23 @@ impl Surface {
             *f += 1;
         }
         let mut surface = Surface { corner, across: vec![NONE; sides as usize], at: vec![NONE; vertices] };
+        let ending = |surface: &Surface, at: u32, end: u32| {
+            let of = &from[start[at as usize] as usize..start[at as usize + 1] as usize];
+            of.iter().copied().find(|&t| surface.corner[next(t) as usize] == end)
+        };
         for s in 0..sides {
             let (a, b) = (surface.corner[s as usize], surface.corner[next(s) as usize]);
-            let of = |v: u32| start[v as usize] as usize..start[v as usize + 1] as usize;
-            let ending = |at: u32, end: u32| {
-                let corner = &surface.corner;
-                from[of(at)].iter().copied().filter(move |&t| corner[next(t) as usize] == end)
-            };
-            if ending(a, b).count() > 1 {
+            surface.across[s as usize] = ending(&surface, b, a).unwrap_or(NONE);
+        }
+        for s in 0..sides {
+            let across = surface.across[s as usize];
+            let (a, b) = (surface.corner[s as usize], surface.corner[next(s) as usize]);
+            // The first that runs this way is the only one.
+            let first =
+                if across == NONE { ending(&surface, a, b)? } else { surface.across[across as usize] };
+            if first != s {
                 return None;
             }
-            let opposite = ending(b, a).next();
-            surface.across[s as usize] = opposite.unwrap_or(NONE);
         }
         for s in (0..sides).rev() {
             let at = &mut surface.at[surface.corner[s as usize] as usize];

@@ -57,7 +57,7 @@ pub(crate) fn rows(a: (i32, i32), b: (i32, i32), c: (i32, i32), mut f: impl FnMu
 
 /// The same for a triangle with an area, without its corners.
 #[inline(always)]
-pub(super) fn rows_between_corners(
+pub(crate) fn rows_between_corners(
     a: (i32, i32),
     b: (i32, i32),
     c: (i32, i32),

@@ -1,8 +1,8 @@
 //! How far the samples of a triangle, and the points where its sides cross the grid, lie from it: in integers.
 
 use super::field::{Field, Tolerance, VOID};
-pub(crate) use super::lattice::{area, rows};
-use super::lattice::{rows_between_corners, whole_and_rest};
+use super::lattice::whole_and_rest;
+pub(crate) use super::lattice::{area, rows, rows_between_corners};
 
 /// A corner: column, row, height in quanta.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -127,6 +127,8 @@ pub(in super::super) struct Sources<'a> {
     chunks: &'a [u32],
     /// Where vertices are at last.
     places: &'a [[f64; 3]],
+    /// Of runs of splits that are numbered otherwise in the file: the first here, and there.
+    names: &'a [[u32; 2]],
     first: u32,
     first_face: u32,
     /// Splits of the context, ascending; of each split its place there.
@@ -159,6 +161,7 @@ impl<'a> Sources<'a> {
             on,
             chunks,
             places,
+            names: &[],
             first: 0,
             first_face: 0,
             ids: Vec::new(),
@@ -166,6 +169,19 @@ impl<'a> Sources<'a> {
             faces: Vec::new(),
             maker,
         }
+    }
+
+    /// With the splits here numbered otherwise than in the file, though in the same order: of runs of them the first here, and there.
+    pub(in super::super) fn with_names(mut self, names: &'a [[u32; 2]]) -> Self {
+        self.names = names;
+        self
+    }
+
+    /// The number of a split in the file.
+    #[inline]
+    fn name(&self, i: u32) -> u32 {
+        let run = self.names.partition_point(|n| n[0] <= i).checked_sub(1);
+        run.map_or(i, |k| self.names[k][1] + (i - self.names[k][0]))
     }
 
     /// All splits before `range` that those in it depend on.
@@ -272,11 +288,17 @@ impl Codec<'_> {
             self.begin(&mut c[CONNECTIVITY], &of, count as usize)?;
             for k in 0..count as usize {
                 let wanted = sources.as_ref().map(|s| s.wanted(pm, part[k]));
-                let gap = part.get(k).map_or(0, |&i| i - next);
+                let own = sources.as_ref().zip(part.get(k));
+                let gap = own.map_or(0, |(s, &i)| s.name(i) - next);
                 let gap = c[CONNECTIVITY].number(&mut self.m.context.gap[near as usize], gap as u64);
                 near = gap == 0;
-                let id = u32::try_from(gap).ok()?.checked_add(next).filter(|&i| i < known.first)?;
-                next = id + 1;
+                let id = u32::try_from(gap).ok()?.checked_add(next)?;
+                next = id.checked_add(1)?;
+                // Here a writer may number splits otherwise.
+                let id = own.map_or(id, |o| *o.1);
+                if id >= known.first {
+                    return None;
+                }
                 let (v, state) = self.sweep(&mut c[CONNECTIVITY], wanted.map_or(NONE, |w| w.vertex))?;
                 let two = !self.singles.is(id);
                 let (code, cuts) = self.cuts(&mut c[CONNECTIVITY], (v, state), two, wanted)?;
