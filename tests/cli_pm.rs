@@ -196,7 +196,7 @@ fn quantising_moves_vertices_by_no_more_than_it_says() {
 #[test]
 fn chunks_that_follow_each_other_bring_the_same_mesh() {
     let p = Place::new();
-    p.generate("cad", "in.ply", 3000);
+    p.generate("cad", "in.ply", 16_000);
     p.done("encode in.ply in.pm -q");
     p.done("encode in.ply sequel.pm -q --sequential");
     p.done("decode in.pm a.ply -q");

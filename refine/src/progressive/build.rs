@@ -86,7 +86,7 @@ pub fn build_all(
             let slots = Slots::new(&mesh, &recorded.log);
             let (positions, wedges) = (std::mem::take(mesh.positions_mut()), mesh.wedges_mut().take());
             let (mut pm, full) = Builder::new(&mesh, &recorded.log, &slots).run(positions, wedges);
-            pm.order = Some(InputOrder::find(full.as_ref(), &slots, input.as_ref(), triangles.as_ref()));
+            pm.order = Some(InputOrder::find(full.as_ref(), &pm, &slots, input.as_ref(), triangles.as_ref()));
             pm.levels = find_levels(&pm, &recorded, options.method);
             pm
         })
@@ -318,6 +318,7 @@ impl InputOrder {
     /// What the input looked like, seen from the progressive mesh that was made of it; `full` holds the wedges at full detail. O(n).
     fn find(
         full: Option<&WedgeReplay<'_>>,
+        pm: &ProgressiveMesh,
         slots: &Slots,
         input: Option<&MeshInput>,
         triangles: Option<&(MeshInput, Vec<u32>)>,
@@ -332,7 +333,7 @@ impl InputOrder {
             order.note_polygons(input, triangles, map);
         }
         if let (Some(full), Some(w)) = (full, &input.wedges) {
-            full.compare(&mut order, w);
+            full.compare(pm, &slots.face, &mut order, w);
         }
         order
     }

@@ -2,7 +2,7 @@
 
 use super::input::InputOrder;
 use super::links::next;
-use super::{SplitCode, WedgeStreams};
+use super::{ProgressiveMesh, SplitCode, WedgeStreams};
 use crate::aif::{FaceId, NONE, Topology, VertexId, Wedges};
 use crate::simplify::{CollapseLog, LoggedWing};
 use std::ops::Range;
@@ -22,6 +22,8 @@ pub(super) struct WedgeReplay<'a> {
     changed: Vec<u32>,
     /// Wedges that the split at hand makes, if it lists them.
     fresh: Vec<u32>,
+    /// Where a seam ended two wedges became one: cursors, which tell corners by that alone, give all of them the first of the two.
+    ambiguous: bool,
 }
 
 /// The corner of a face at the end of its edge (`half`) where the wedge is looked for: the split vertex, or the far end.
@@ -63,7 +65,7 @@ impl<'a> WedgeReplay<'a> {
             }
         }
         let (pairs, changed, fresh) = Default::default();
-        WedgeReplay { log, wedges, slot, count, out, pairs, changed, fresh }
+        WedgeReplay { log, wedges, slot, count, out, pairs, changed, fresh, ambiguous: false }
     }
 
     /// The slots of the wedges of a triangle.
@@ -77,9 +79,30 @@ impl<'a> WedgeReplay<'a> {
         std::mem::take(&mut self.out)
     }
 
-    /// Writes down where the wedges, which are those of full detail now, are not the input's.
-    pub(super) fn compare(&self, order: &mut InputOrder, input: &Wedges) {
-        order.note_wedges(&self.wedges, &self.slot, input);
+    /// Writes down where the wedges at full detail are not the input's. `face` is the slot of every face of the mesh.
+    pub(super) fn compare(&self, pm: &ProgressiveMesh, face: &[u32], order: &mut InputOrder, input: &Wedges) {
+        match self.shown(pm, face) {
+            Some(shown) => {
+                let slot: Vec<u32> = (0..shown.len() as u32).collect();
+                order.note_wedges(&shown, &slot, input);
+            }
+            None => order.note_wedges(&self.wedges, &self.slot, input),
+        }
+    }
+
+    /// The wedges that a cursor shows at full detail, by corners of the mesh.
+    fn shown(&self, pm: &ProgressiveMesh, face: &[u32]) -> Option<Wedges> {
+        if !self.ambiguous {
+            return None;
+        }
+        let mut cursor = pm.cursor().ok()?;
+        cursor.seek(usize::MAX).ok()?;
+        let mut shown = Wedges::new(self.wedges.channels().to_vec()).ok()?;
+        for w in 0..cursor.wedge_count() as u32 {
+            shown.push(cursor.row(w), cursor.present(w));
+        }
+        shown.corner = face.iter().flat_map(|&slot| cursor.indices()[slot as usize]).collect();
+        Some(shown)
     }
 
     fn run_of(&self, i: usize) -> (Range<usize>, Range<usize>) {
@@ -202,6 +225,7 @@ impl<'a> WedgeReplay<'a> {
             let pair = (std::mem::replace(&mut w.corner[c as usize], fine), fine);
             // Mostly the faces in a row are alike.
             if self.pairs.last() != Some(&pair) && !self.pairs.contains(&pair) {
+                self.ambiguous |= self.pairs.iter().any(|p| p.0 == pair.0);
                 self.pairs.push(pair);
             }
         }
