@@ -193,7 +193,8 @@ impl Cut<'_> {
 }
 
 /// Samples along the side of a part of [`greedy_in_parts`], about. Small enough for many threads, large enough for few vertices on cuts, most of which go when
-/// the network is improved: on fuji at 10 m and grandcanyon at 10 m it ends within 1 % of what one part gives, on N57E011 at 20 m with 4 % more triangles.
+/// the network is improved. With it and the rounds of `thin.rs` together, networks have 0 to 2 % more triangles than before both, 5 % more where they have
+/// few (N57E011 at 20 m: 3,569).
 const SIDE: usize = 256;
 
 /// Whether a grid is worth cutting.
