@@ -283,8 +283,7 @@ impl Bounds {
         }
         let centre = |i: usize| self.place_before(mesh, forest, i as u32).as_dvec3();
         let ups = forest.ups();
-        for i in 0..self.len() {
-            let up = ups[i] as usize;
+        for (i, up) in ups.iter().map(|&up| up as usize).enumerate() {
             if let Some(above) = self.of.get(up) {
                 let reach = centre(i).distance(centre(up)) + self.radius(i);
                 if self.of[i].error > above.error || reach > self.radius(up) {

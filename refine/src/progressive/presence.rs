@@ -139,7 +139,7 @@ mod tests {
     #[test]
     fn it_holds_what_a_vector_does_in_less() {
         for (kinds, bytes) in [(1u64, 8), (3, 1100), (256, 3100), (700, 8000)] {
-            let all: Vec<u64> = (0..1000).map(|i| (i * 7919) % kinds << 3).collect();
+            let all: Vec<u64> = (0..1000).map(|i| ((i * 7919) % kinds) << 3).collect();
             let mut p = Presence::default();
             assert!(p.is_empty() && p.get(0).is_none());
             p.extend(all.iter().copied());

@@ -127,10 +127,10 @@ mod tests {
             let (split, up) = ((state >> 8) % 3000, (step / 10_000) % 2 == 0);
             let of = |r: u32| made[r as usize];
             assert_eq!(index.find(split, of), map.get(&split).copied().unwrap_or(NONE));
-            if map.contains_key(&split) && (!up || state % 3 == 0) {
+            if map.contains_key(&split) && (!up || state.is_multiple_of(3)) {
                 index.remove(split, of);
                 map.remove(&split);
-            } else if !map.contains_key(&split) && (up || state % 3 == 0) {
+            } else if !map.contains_key(&split) && (up || state.is_multiple_of(3)) {
                 let record = made.len() as u32;
                 made.push(split);
                 index.insert(split, record, |r| made[r as usize]);

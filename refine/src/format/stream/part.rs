@@ -131,7 +131,7 @@ impl Path<'_> {
         };
         let cut = |c: u32| {
             let f = c >> 2;
-            if c == NONE { c } else { numbers.face(f) << 2 | ((c & 3) + 3 - u32::from(tip(f))) % 3 }
+            if c == NONE { c } else { (numbers.face(f) << 2) | (((c & 3) + 3 - u32::from(tip(f))) % 3) }
         };
         let mut added = Vec::with_capacity(owner.len());
         for (&t, k) in order.order.iter().zip(self.on.len() as u32..) {
