@@ -25,7 +25,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub struct Options {
     /// At full detail every sample is within this of the mesh; at 0 every sample is a vertex.
     pub floor: f64,
-    /// Steps along a side of a block of the finest level. Larger ones lock fewer vertices, but take more memory.
+    /// Steps along a side of a block of the finest level. Larger ones lock fewer vertices, but take more memory. With 256 a flight over the Grand Canyon shows 0.2 % fewer faces, and
+    /// ETOPO5 takes a quarter more time; with 64 flights show 4 to 7 % more.
     pub cells: usize,
     /// About how many bytes of heights and blocks to hold at once. Where a block has more heights than a 32nd of it, it is measured against the least and greatest of squares of them,
     /// which makes bounds of the coarsest blocks a little larger.
@@ -36,7 +37,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Options { floor: 0.0, cells: 256, memory: 384 << 20, spacing: [1.0; 2] }
+        Options { floor: 0.0, cells: 128, memory: 384 << 20, spacing: [1.0; 2] }
     }
 }
 

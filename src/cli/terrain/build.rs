@@ -37,7 +37,7 @@ pub(crate) struct Args {
           default_value_t = 0.0, help_heading = "Blocks")]
     floor: f64,
     /// Steps along a side of the finest blocks, 8 to 4096
-    #[arg(long, value_name = "N", value_parser = side, allow_negative_numbers = true, default_value_t = 256,
+    #[arg(long, value_name = "N", value_parser = side, allow_negative_numbers = true, default_value_t = 128,
           help_heading = "Blocks")]
     block: usize,
     /// Hold about so much of heights and blocks at once
