@@ -158,14 +158,11 @@ impl SelectiveScene {
         self.views.iter().map(|v| v.hierarchy().mesh().vertices()).sum()
     }
 
-    /// Least and greatest coordinates in the world of spheres about the meshes' places; `None` if nothing is shown.
+    /// Least and greatest coordinates, in the world, of the boxes of the meshes at full detail; `None` if nothing is shown. O(n).
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let mut all: Option<(DVec3, DVec3)> = None;
         for (view, places) in self.views.iter().zip(&self.places) {
-            let pm = view.hierarchy().mesh();
-            let own = [&pm.base_positions, &pm.new_positions];
-            let own = own.into_iter().filter_map(|p| p.bounds());
-            let Some((lo, hi)) = own.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else { continue };
+            let Some((lo, hi)) = view.hierarchy().mesh().full_bounds() else { continue };
             for m in places {
                 for k in 0..8u32 {
                     let pick = |axis: usize| if k >> axis & 1 == 1 { hi[axis] } else { lo[axis] };

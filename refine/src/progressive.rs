@@ -29,6 +29,7 @@ pub use presence::Presence;
 
 use crate::aif::{Channel, NONE, Positions};
 use crate::hierarchy::Bounds;
+use glam::DVec3;
 use std::sync::Arc;
 
 /// What a split does beside its references, packed.
@@ -299,6 +300,18 @@ impl ProgressiveMesh {
     /// Vertices at full detail.
     pub fn vertices(&self) -> usize {
         self.base_vertices() + self.splits.len()
+    }
+
+    /// Least and greatest coordinates at full detail; `None` without vertices. O(n).
+    pub fn full_bounds(&self) -> Option<(DVec3, DVec3)> {
+        // Where each vertex goes last.
+        let mut last: Vec<DVec3> = (0..self.base_vertices()).map(|v| self.base_positions.get(v)).collect();
+        last.extend((0..self.splits.len()).map(|i| self.new_positions.get(i)));
+        let moving = self.splits.code.iter().zip(&self.splits.vertex).filter(|(code, _)| code.moves());
+        for ((_, &v), k) in moving.zip(0..) {
+            last[v as usize] = self.moved_positions.get(k);
+        }
+        last.into_iter().map(|p| (p, p)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
     /// Faces at full detail. O(n).

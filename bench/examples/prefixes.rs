@@ -1,7 +1,7 @@
 //! How good the beginnings of a progressive mesh file are: encodes the largest mesh of a file and measures what its first bytes show beside the method's own mesh with as
 //! many splits. Ends with an error where that is more than 1.5 times as far from the input (rms).
 //!
-//! `cargo run --release --example prefixes -- in.ply [any-order] [sequential] [nsa] [optimal]` (default: with the order, quadric, endpoint)
+//! `cargo run --release -p progmesh-bench --example prefixes -- in.ply [any-order] [sequential] [nsa] [optimal]` (default: with the order, quadric, endpoint)
 use progmesh::aif::{BuildOptions, Mesh};
 use progmesh::io::files::read_scene;
 use progmesh::refine::ProgressiveMesh;

@@ -1,6 +1,6 @@
 //! What recording costs: the largest mesh of a file simplified as far as is legal, and the same with its vertex splits, in turns.
 //!
-//! `cargo run --release --example recording -- in.obj [nsa] [exact] [endpoint] [optimal] [midpoint] [plain|recorded]`
+//! `cargo run --release -p progmesh-bench --example recording -- in.obj [nsa] [exact] [endpoint] [optimal] [midpoint] [plain|recorded]`
 //!
 //! With `plain` or `recorded` only that is done, once, in a function that valgrind can be told of:
 //! `valgrind --tool=callgrind --toggle-collect='*measured_part*' target/release/examples/recording in.obj nsa recorded`
