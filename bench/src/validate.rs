@@ -30,12 +30,17 @@ pub(crate) fn validate(places: &Places, program: &Path, folder: &Path) -> Result
     for command in commands(&text) {
         println!("$ progmesh {}", command.join(" "));
         let words: Vec<String> = command.iter().map(|w| placed(w, &root)).collect();
-        for word in inputs(&command).filter(|w| !root.join(w).exists() && !folder.join(w).exists()) {
-            let done = Command::new(program)
-                .current_dir(folder)
-                .args(["generate", "quad-sphere", word, "--faces", "6000"])
-                .output()?;
-            ensure!(done.status.success(), "{word}: {}", String::from_utf8_lossy(&done.stderr));
+        let given: Vec<&str> =
+            inputs(&command).filter(|w| !root.join(w).exists() && !folder.join(w).exists()).collect();
+        let mut missing = None;
+        for word in given {
+            if !make(program, folder, word)? {
+                missing = Some(word);
+            }
+        }
+        if let Some(word) = missing {
+            println!("  not run: {word} cannot be generated");
+            continue;
         }
         let done = Command::new(program).current_dir(folder).args(&words).output()?;
         // 1: done, but short of a target.
@@ -84,19 +89,50 @@ fn commands(text: &str) -> Vec<Vec<String>> {
     all
 }
 
-/// Files that a command reads: meshes before the last one, which it writes; all of them where it only looks.
+/// A camera that sees what is generated.
+const CAMERA: &str = r#"{"eye": [0, 1, 4], "target": [0, 0, 0], "up": [0, 1, 0], "fov_y_deg": 45, "width": 640, "height": 480, "near": 0.1, "far": 100}"#;
+
+/// Generates a file that a command takes as given; false if that is not known how.
+fn make(program: &Path, folder: &Path, word: &str) -> Result<bool> {
+    let run = |arguments: &[&str]| -> Result<()> {
+        let done = Command::new(program).current_dir(folder).args(arguments).output()?;
+        ensure!(done.status.success(), "{word}: {}", String::from_utf8_lossy(&done.stderr));
+        Ok(())
+    };
+    let extension = Path::new(word).extension().and_then(|e| e.to_str()).unwrap_or_default();
+    match extension {
+        "pm" => {
+            let mesh = format!("{word}.ply");
+            run(&["generate", "scan", &mesh, "--faces", "6000"])?;
+            run(&["encode", &mesh, word, "-q"])?;
+        }
+        "tif" | "tiff" => run(&["generate", "terrain", word, "--size", "65"])?,
+        "json" => std::fs::write(folder.join(word), CAMERA)?,
+        _ if Format::from_name(word).is_some() => {
+            run(&["generate", "quad-sphere", word, "--faces", "6000"])?;
+        }
+        _ => return Ok(false),
+    }
+    Ok(true)
+}
+
+/// Files that a command reads: meshes before the last one, which it writes, or all of them where it only looks; a height grid; what flags name.
 fn inputs(words: &[String]) -> impl Iterator<Item = &str> {
+    const FILES: [&str; 5] = ["--camera", "--frustum", "--texture", "--breaklines", "--path"];
+    let named = words.windows(2).filter(|w| FILES.contains(&w[0].as_str()) && w[1].contains('.'));
+    let grid = words.iter().skip(2).take(usize::from(words.first().is_some_and(|w| w == "terrain")));
+    let beside: Vec<&str> = named.map(|w| w[1].as_str()).chain(grid.map(String::as_str)).collect();
     let meshes: Vec<&str> = words
         .iter()
         .map(String::as_str)
         .filter(|w| !w.starts_with('-') && Format::from_name(w).is_some())
         .collect();
     let read = match words.first().map(String::as_str) {
-        Some("generate") => 0,
-        Some("simplify" | "convert") => meshes.len().min(1),
-        _ => meshes.len(),
+        Some("generate" | "terrain") => 0,
+        Some("compare" | "info" | "fly") => meshes.len(),
+        _ => meshes.len().min(1),
     };
-    meshes.into_iter().take(read)
+    meshes.into_iter().take(read).chain(beside)
 }
 
 /// A file of the repository by its place; everything else as it is.
