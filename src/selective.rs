@@ -7,6 +7,7 @@ mod morph;
 mod paged;
 mod player;
 mod record;
+mod shared;
 mod shot;
 mod terrain;
 mod tolerance;
@@ -31,6 +32,7 @@ use crate::refine::view::Camera;
 use crate::scene::Scene;
 use glam::{DMat4, DVec3};
 use morph::Morphs;
+use shared::Drawn;
 use std::sync::Arc;
 
 /// A scene with a [`View`] of each mesh. A mesh that stands in several places is as fine as the most demanding of them asks.
@@ -128,6 +130,11 @@ impl SelectiveScene {
         self.morphs.displaced(m)
     }
 
+    /// The meshes as they are drawn.
+    fn drawn(&self) -> impl Iterator<Item = Drawn<'_>> {
+        (0..self.views.len()).map(|m| Drawn { view: self.shown(m), displaced: self.displaced(m) })
+    }
+
     /// Where each mesh stands.
     pub fn placements(&self) -> &[Vec<DMat4>] {
         &self.places
@@ -135,7 +142,7 @@ impl SelectiveScene {
 
     /// Faces shown, of all meshes, each counted once.
     pub fn face_count(&self) -> usize {
-        (0..self.views.len()).map(|m| self.shown(m).face_count()).sum()
+        shared::face_count(self.drawn())
     }
 
     /// Faces that the last frame asked for: [`SelectiveScene::face_count`], but for what [`Geomorph::Time`] still shows.
@@ -145,7 +152,7 @@ impl SelectiveScene {
 
     /// Vertices shown.
     pub fn vertex_count(&self) -> usize {
-        (0..self.views.len()).map(|m| self.shown(m).vertex_count()).sum()
+        shared::vertex_count(self.drawn())
     }
 
     /// Faces at full detail.
@@ -185,17 +192,12 @@ impl SelectiveScene {
         cull: Cull,
         limits: &Limits<'_>,
     ) -> Result<Done, SelectiveError> {
-        let mut all = Done { complete: true, ..Done::default() };
+        let mut all = Done::NOTHING;
         let lenses = self.lenses(camera, tau / self.morphs.band(), cull)?;
         for (m, lenses) in lenses.iter().enumerate() {
             let others = self.needed_faces() - self.views[m].face_count();
             let limits = Limits { faces: limits.faces.saturating_sub(others), ..*limits };
-            let done = self.views[m].adapt_to_all(lenses, &limits);
-            all.splits += done.splits;
-            all.collapses += done.collapses;
-            all.forced += done.forced;
-            all.refused += done.refused;
-            all.complete &= done.complete;
+            all += self.views[m].adapt_to_all(lenses, &limits);
         }
         if let Some([splits, collapses]) = self.morphs.follow(&self.views, &lenses) {
             (all.splits, all.collapses) = (splits, collapses);
@@ -209,8 +211,8 @@ impl SelectiveScene {
     pub fn lenses(&self, camera: &Camera, tau: f64, cull: Cull) -> Result<Vec<Vec<Lens>>, SelectiveError> {
         let of = |m: usize| {
             let h = self.views[m].hierarchy();
-            let each = self.places[m].iter().map(|p| Lens::new(h, camera, p, tau, cull));
-            each.collect::<Result<Vec<_>, _>>().map_err(|source| SelectiveError::Lens { mesh: m, source })
+            let lens = |p: &DMat4| Lens::new(h, camera, p, tau, cull);
+            shared::lenses(&self.places[m], lens, |source| SelectiveError::Lens { mesh: m, source })
         };
         (0..self.views.len()).map(of).collect()
     }
@@ -226,11 +228,8 @@ impl SelectiveScene {
         cull: Cull,
         faces: Option<usize>,
     ) -> Result<f64, SelectiveError> {
-        let most = faces.unwrap_or(usize::MAX);
-        tolerance::least(tau, |tau| {
-            self.adapt(camera, tau, cull, &Limits::default())?;
-            Ok(self.face_count() <= most)
-        })
+        let adapt = |s: &mut Self, tau| s.adapt(camera, tau, cull, &Limits::default()).map(|_| true);
+        shared::extract(self, (tau, faces), adapt, Self::face_count)
     }
 
     /// What changed in the buffers of each mesh since this was last called.
@@ -240,52 +239,17 @@ impl SelectiveScene {
 
     /// The scene as it is shown. At full detail it is the scene that was made progressive, bit for bit. O(n).
     pub fn to_scene(&self) -> Scene {
-        let mut scene = self.shell.clone();
-        scene.meshes.resize_with(self.views.len(), Default::default);
-        let whole = |m: usize| {
-            let v = self.shown(m);
-            v.vertex_count() == v.hierarchy().mesh().vertices() && self.displaced(m).is_empty()
-        };
-        let all = (0..self.views.len()).all(whole);
-        for i in 0..self.views.len() {
-            let view = self.shown(i);
-            let geometry = view.to_input_with(self.displaced(i));
-            let ordered = view.hierarchy().mesh().order.is_some();
-            scene.meshes[i].geometry = match self.leftovers.get(i).filter(|_| all && ordered) {
-                Some(left) => left.put_back(geometry),
-                None => geometry,
-            };
-        }
-        scene
+        shared::scene_of(&self.shell, &self.leftovers, &self.drawn().collect::<Vec<_>>())
     }
 
     /// The triangles shown, in the world: three corners each.
     pub fn triangles(&self) -> Vec<[DVec3; 3]> {
-        let mut out = Vec::new();
-        for (m, places) in self.places.iter().enumerate() {
-            let (view, displaced) = (self.shown(m), self.displaced(m));
-            let slots = (0..view.indices().len()).filter(|&s| view.face_in(s).is_some());
-            let at = |w: u32| morph::place(view, displaced, view.wedge_vertex(w)).unwrap_or_default();
-            let own: Vec<[DVec3; 3]> = slots.map(|s| view.indices()[s].map(at)).collect();
-            for m in places {
-                out.extend(own.iter().map(|t| t.map(|p| m.transform_point3(p))));
-            }
-        }
-        out
+        shared::triangles(self.drawn(), &self.places)
     }
 
     /// Vertices that a camera's frustum holds, of those shown, places counted each.
     pub fn visible_vertices(&self, camera: &Camera) -> usize {
-        let frustum = camera.frustum();
-        let mut count = 0;
-        for (m, places) in self.places.iter().enumerate() {
-            let (view, displaced) = (self.shown(m), self.displaced(m));
-            let all = 0..view.hierarchy().mesh().vertices() as u32;
-            for p in all.filter_map(|v| morph::place(view, displaced, v)) {
-                count += places.iter().filter(|m| frustum.contains(m.transform_point3(p))).count();
-            }
-        }
-        count
+        shared::visible_vertices(self.drawn(), &self.places, camera)
     }
 
     /// Bytes that all views share, bytes of the views that grow with what is shown, and bytes of their tables over the finest meshes.

@@ -29,6 +29,7 @@ mod timed;
 pub(crate) use adapt::Meter;
 pub use adapt::{Done, Limits};
 pub use changes::Changes;
+pub(crate) use changes::take_runs;
 pub(crate) use clock::{Clock, Judges};
 pub(crate) use entry::Entry;
 pub(crate) use front::Front;

@@ -2,34 +2,20 @@
 
 mod common;
 
-use common::{NAMES, options, sample};
+use common::{NAMES, Random};
 use glam::DVec3;
 use progmesh_refine::ProgressiveMesh;
 use progmesh_refine::aif::Positions;
 use progmesh_refine::format::{EncodeOptions, decode, encode};
 use progmesh_refine::hierarchy::{Bounds, Guarantee, Hierarchy, Options, Rule};
-use progmesh_refine::progressive::build;
 use progmesh_refine::selective::View;
 use progmesh_refine::simplify::measure::Surface;
-use progmesh_refine::simplify::{Method, Placement, Quiet};
+use progmesh_refine::simplify::{Method, Placement};
 use std::collections::HashMap;
 use std::sync::Arc;
 
 fn progressive(name: &str, faces: usize, placement: Option<Placement>) -> ProgressiveMesh {
-    build(sample(name, faces, 5), &options(Method::Quadric, placement), &Quiet).unwrap().mesh
-}
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) as usize) % n.max(1)
-    }
-
-    fn unit(&mut self) -> f64 {
-        self.below(1 << 30) as f64 / (1u64 << 30) as f64
-    }
+    common::progressive(name, faces, Method::Quadric, placement)
 }
 
 /// Faces around a vertex, ascending, each with the places of its corners.

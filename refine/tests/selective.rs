@@ -2,22 +2,17 @@
 
 mod common;
 
-use common::{NAMES, options, sample};
+use common::{NAMES, Random, any_camera, least_closed, progressive};
 use glam::{DMat4, DVec3};
 use progmesh_refine::aif::*;
 use progmesh_refine::hierarchy::{Hierarchy, Options as HierarchyOptions};
-use progmesh_refine::progressive::build;
 use progmesh_refine::selective::{Cull, Lens, Limits, View};
 use progmesh_refine::simplify::measure::Surface;
-use progmesh_refine::simplify::{Method, Placement, Quiet};
+use progmesh_refine::simplify::{Method, Placement};
 use progmesh_refine::view::{Camera, CameraParameters, Projection};
 use progmesh_refine::{Cursor, ProgressiveMesh};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
-
-fn progressive(name: &str, faces: usize, method: Method, placement: Option<Placement>) -> ProgressiveMesh {
-    build(sample(name, faces, 5), &options(method, placement), &Quiet).unwrap().mesh
-}
 
 const RULES: [HierarchyOptions; 2] = [HierarchyOptions::RINGS, HierarchyOptions::CUTS];
 
@@ -33,19 +28,6 @@ fn both<'a>(names: &'a [&'a str]) -> impl Iterator<Item = (&'a str, &'static Hie
 
 fn hierarchy(name: &str, faces: usize) -> Arc<Hierarchy> {
     hierarchy_by(&HierarchyOptions::RINGS, name, faces)
-}
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) as usize) % n.max(1)
-    }
-
-    fn unit(&mut self) -> f64 {
-        self.below(1 << 30) as f64 / (1u64 << 30) as f64
-    }
 }
 
 /// The two faces on each cut of every split in the progressive mesh's own order, by looking at edges: fn0, fn1, fn2, fn3.
@@ -267,30 +249,9 @@ fn forced_splits_close_over_all_dependencies_and_everything_can_be_undone() {
 }
 
 fn camera(h: &Hierarchy, random: &mut Random, distance: f64, perspective: bool) -> Camera {
-    let (centre, size) = h.extent();
-    let mut ball = || loop {
-        let p = DVec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - 1.0;
-        if p.length() < 1.0 && p.length() > 0.1 {
-            break p;
-        }
-    };
-    let eye = centre + ball().normalize() * size * distance;
-    let projection = if perspective {
-        Projection::Perspective { fov_y_deg: 40.0 }
-    } else {
-        Projection::Orthographic { ortho_height: 0.4 * size }
-    };
-    Camera::new(&CameraParameters {
-        eye,
-        target: centre + ball() * 0.3 * size,
-        up: ball(),
-        projection,
-        width: 640,
-        height: 480,
-        near: 0.01 * size,
-        far: 10.0 * size,
-    })
-    .unwrap()
+    let flat = Projection::Orthographic { ortho_height: 0.4 * h.extent().1 };
+    let projection = if perspective { Projection::Perspective { fov_y_deg: 40.0 } } else { flat };
+    any_camera(h, random, distance, projection)
 }
 
 #[test]
@@ -308,14 +269,7 @@ fn the_cut_depends_on_the_view_alone_and_is_the_least_closed_one() {
             let lens = Lens::new(&h, &c, &DMat4::IDENTITY, tau, cull).unwrap();
             let done = view.adapt(&lens, &Limits::default());
             assert!(done.complete);
-            // All needed splits, whether their vertex is there or not, and what they depend on.
-            let mut want = vec![false; h.splits()];
-            for i in (0..h.splits()).rev() {
-                want[i] |= lens.needs(&h, i);
-                if want[i] {
-                    h.dependencies(i).for_each(|d| want[d] = true);
-                }
-            }
+            let want = least_closed(&h, &lens, |i| h.dependencies(i));
             let have: Vec<bool> = (0..h.splits()).map(|i| view.is_applied(i)).collect();
             assert_eq!(have, want, "{name} {round}");
             partly += (view.face_count() < h.mesh().faces() && view.applied().count() > 0) as usize;

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{assert_same, options, sample};
+use common::{Random, any_camera, assert_same, least_closed, options, progressive, sample};
 use glam::{DMat4, DVec3};
 use progmesh_refine::aif::*;
 use progmesh_refine::hierarchy::{Hierarchy, Options as HierarchyOptions};
@@ -10,7 +10,7 @@ use progmesh_refine::progressive::build;
 use progmesh_refine::selective::{Cull, Lens, Limits, View};
 use progmesh_refine::simplify::{Method, Placement, Quiet};
 use progmesh_refine::truly::{TrulyError, TrulyView};
-use progmesh_refine::view::{Camera, CameraParameters, Projection};
+use progmesh_refine::view::{Camera, Projection};
 use progmesh_refine::{ProgressiveMesh, aif};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -34,21 +34,8 @@ fn quick() -> HierarchyOptions {
 }
 
 fn hierarchy(name: &str, faces: usize, method: Method, placement: Option<Placement>) -> Arc<Hierarchy> {
-    let pm = build(sample(name, faces, 5), &options(method, placement), &Quiet).unwrap().mesh;
+    let pm = progressive(name, faces, method, placement);
     Arc::new(Hierarchy::new(Arc::new(pm), &quick()).unwrap())
-}
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) as usize) % n.max(1)
-    }
-
-    fn unit(&mut self) -> f64 {
-        self.below(1 << 30) as f64 / (1u64 << 30) as f64
-    }
 }
 
 /// Vertices of all faces of the finest mesh, and for each face the split that made it.
@@ -222,24 +209,7 @@ fn sets_by_the_hierarchy_s_own_rule_make_the_same_mesh() {
 }
 
 fn camera(h: &Hierarchy, random: &mut Random, distance: f64) -> Camera {
-    let (centre, size) = h.extent();
-    let mut ball = || loop {
-        let p = DVec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - 1.0;
-        if p.length() < 1.0 && p.length() > 0.1 {
-            break p;
-        }
-    };
-    Camera::new(&CameraParameters {
-        eye: centre + ball().normalize() * size * distance,
-        target: centre + ball() * 0.3 * size,
-        up: ball(),
-        projection: Projection::Perspective { fov_y_deg: 40.0 },
-        width: 640,
-        height: 480,
-        near: 0.01 * size,
-        far: 10.0 * size,
-    })
-    .unwrap()
+    any_camera(h, random, distance, Projection::Perspective { fov_y_deg: 40.0 })
 }
 
 #[test]
@@ -256,13 +226,7 @@ fn without_the_guard_the_set_depends_on_the_view_alone_and_is_the_least() {
             let cull = [Cull::None, Cull::Frustum, Cull::Cone, Cull::All][round % 4];
             let lens = Lens::new(&h, &c, &DMat4::IDENTITY, [0.3, 1.0, 4.0][random.below(3)], cull).unwrap();
             assert!(view.adapt(&lens, &Limits::default()).complete);
-            let mut want = vec![false; h.splits()];
-            for i in (0..h.splits()).rev() {
-                want[i] |= lens.needs(&h, i);
-                if want[i] {
-                    view.dependencies(i).for_each(|d| want[d] = true);
-                }
-            }
+            let want = least_closed(&h, &lens, |i| view.dependencies(i));
             let have: Vec<bool> = (0..h.splits()).map(|i| view.is_applied(i)).collect();
             assert_eq!(have, want, "{name} {round}");
             let again = view.adapt(&lens, &Limits::default());

@@ -2,6 +2,7 @@
 
 mod flight;
 mod geomorph;
+mod pace;
 mod paged;
 mod path;
 mod play;
@@ -15,13 +16,14 @@ use super::common::{self, Warnings};
 use super::control::Interrupt;
 use super::extract::{self, Needs};
 use super::method::Making;
-use flight::{Setting, Step, fly};
+use flight::{Step, fly};
 use glam::DVec3;
+use pace::{Measuring, Setting};
 use path::PathArgs;
 use play::PlayArgs;
 use progmesh::refine::view::Camera;
-use progmesh::selective::{Geomorph, Judge, SelectiveScene};
-use report::{Frame, Measured, Memory, OnGround, Report};
+use progmesh::selective::{Geomorph, SelectiveScene};
+use report::{Frame, Memory, Report};
 use shots::ShotArgs;
 
 /// Fly a camera along a path, refine the mesh for every frame, and report what that took.
@@ -185,11 +187,7 @@ impl Args {
         interrupt: &Interrupt,
     ) -> Result<(Vec<Frame>, [usize; 3]), Failure> {
         let file = self.input.name();
-        let failed = |e: &dyn std::fmt::Display| Failure::Input(format!("{file}: {e}"));
-        let judge = match self.measure_every.filter(|_| course.ground.is_none()) {
-            Some(_) => Some(Judge::new(scene, self.samples).map_err(|e| failed(&e))?),
-            None => None,
-        };
+        let measuring = Measuring::new(self.measure_every, scene, self.samples, course, &file)?;
         let path: &[Camera] = &course.cameras;
         let mut frames = Vec::with_capacity(path.len());
         let mut shots = self.shots.start(course);
@@ -197,21 +195,9 @@ impl Args {
         if let Some(p) = &mut player {
             p.begin(self.needs.tau, true)?;
         }
-        fly(scene, path, &self.setting(self.needs.tau, interrupt), &file, &mut |step: &Step<'_>| {
-            let due = self.measure_every.is_some_and(|n| step.number.is_multiple_of(n));
-            let measured = match judge.as_ref().filter(|_| due) {
-                Some(j) => {
-                    let m = j.measure(step.scene, step.camera).map_err(|e| failed(&e))?;
-                    Some(Measured {
-                        samples: m.visible,
-                        max_pixels: m.max_pixels,
-                        mean_pixels: m.mean_pixels,
-                    })
-                }
-                None => None,
-            };
-            let ground = course.ground.as_ref().filter(|_| due);
-            let on_ground = ground.map(|g| OnGround::of(&g.judge(&step.scene.triangles(), step.camera)));
+        fly(scene, path, self.setting(self.needs.tau, interrupt), &file, &mut |step: &Step<'_>| {
+            let (measured, on_ground) =
+                measuring.measure(step.number, step.camera, || step.scene.triangles())?;
             shots.take(step)?;
             if let Some(p) = &mut player {
                 p.take(step)?;
@@ -219,19 +205,13 @@ impl Args {
             frames.push(Frame {
                 faces: step.scene.face_count(),
                 vertices: step.scene.vertex_count(),
-                vsplits: step.done.splits,
-                ecols: step.done.collapses,
-                us: step.us,
-                tau: step.tau.is_finite().then_some(step.tau),
-                complete: step.done.complete,
                 morphing: step.scene.morphing(),
                 visible_vertices: step.scene.visible_vertices(step.camera),
                 dirty_index_bytes: step.changes.iter().map(|c| c.index_bytes()).sum(),
                 dirty_wedges: step.changes.iter().map(|c| c.wedges.len()).sum(),
-                fetched: None,
-                no_room: None,
                 measured,
                 on_ground,
+                ..step.timed.frame(&step.timed.done)
             });
             Ok(())
         })?;
@@ -243,7 +223,7 @@ impl Args {
                 scene.reset();
                 p.begin(tau, false)?;
                 let setting = self.setting(tau, interrupt);
-                fly(scene, path, &setting, &file, &mut |step: &Step<'_>| p.take(step))?;
+                fly(scene, path, setting, &file, &mut |step: &Step<'_>| p.take(step))?;
             }
             p.write(scene)?;
         }

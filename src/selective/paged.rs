@@ -1,13 +1,13 @@
 //! A scene refined where a camera needs it, of which only what is needed is read.
 
-use super::{places_of, tolerance};
+use super::{places_of, shared};
 use crate::aif::NONE;
 use crate::io::DecodeError;
 use crate::io::grid::ReadAt;
 use crate::io::pm;
 use crate::refine::format::{ByteRanges, ChunkType, FormatError, RangeReader};
 use crate::refine::paged::{PagedDone, PagedError, PagedLimits, PagedView, Traffic};
-use crate::refine::selective::{Cull, Lens, LensError, Limits};
+use crate::refine::selective::{Cull, LensError, Limits};
 use crate::refine::view::Camera;
 use crate::scene::Scene;
 use glam::{DMat4, DVec3};
@@ -116,12 +116,12 @@ impl PagedScene {
 
     /// Faces shown, of all meshes, each counted once.
     pub fn face_count(&self) -> usize {
-        self.views.iter().map(PagedView::face_count).sum()
+        shared::face_count(self.views.iter())
     }
 
     /// Vertices shown.
     pub fn vertex_count(&self) -> usize {
-        self.views.iter().map(PagedView::vertex_count).sum()
+        shared::vertex_count(self.views.iter())
     }
 
     /// Splits applied.
@@ -210,12 +210,11 @@ impl PagedScene {
         cull: Cull,
         limits: &PagedLimits<'_>,
     ) -> Result<PagedDone, PagedSceneError> {
-        let mut all = PagedDone::default();
-        all.done.complete = true;
+        let mut all = PagedDone::NOTHING;
         for mesh in 0..self.views.len() {
             let lens = |p: &DMat4| self.views[mesh].lens(camera, p, tau, cull);
-            let lenses: Result<Vec<Lens>, LensError> = self.places[mesh].iter().map(lens).collect();
-            let lenses = lenses.map_err(|source| PagedSceneError::Lens { mesh, source })?;
+            let failed = |source| PagedSceneError::Lens { mesh, source };
+            let lenses = shared::lenses(&self.places[mesh], lens, failed)?;
             let others = self.face_count() - self.views[mesh].face_count();
             let faces = limits.limits.faces.saturating_sub(others);
             // Once with what is free, and if that is too little, once more with what others can spare.
@@ -229,19 +228,13 @@ impl PagedScene {
                 };
                 let done = view.adapt(&lenses, &own);
                 let done = done.map_err(|source| PagedSceneError::Mesh { mesh, source })?;
-                all.done.splits += done.done.splits;
-                all.done.collapses += done.done.collapses;
-                all.done.forced += done.done.forced;
-                all.fetched += done.fetched;
                 let spare = |(k, v): (usize, &mut PagedView<Ranges>)| if k == mesh { 0 } else { v.trim() };
                 let more = done.no_room > 0 && attempt == 0;
                 if more && self.views.iter_mut().enumerate().map(spare).sum::<usize>() > 0 {
+                    all += done.so_far();
                     continue;
                 }
-                all.done.refused += done.done.refused;
-                all.done.complete &= done.done.complete;
-                all.no_room += done.no_room;
-                all.postponed += done.postponed;
+                all += done;
                 break;
             }
         }
@@ -259,12 +252,9 @@ impl PagedScene {
         cull: Cull,
         faces: Option<usize>,
     ) -> Result<f64, PagedSceneError> {
-        let most = faces.unwrap_or(usize::MAX);
         let limits = PagedLimits::default();
-        tolerance::least(tau, |tau| {
-            let done = self.adapt(camera, tau, cull, &limits)?;
-            Ok(self.face_count() <= most && done.done.complete)
-        })
+        let adapt = |s: &mut Self, tau| s.adapt(camera, tau, cull, &limits).map(|done| done.done.complete);
+        shared::extract(self, (tau, faces), adapt, Self::face_count)
     }
 
     /// Bytes of the index buffers, and entries of the vertex buffers, that changed since this was last called.
@@ -295,13 +285,6 @@ impl PagedScene {
 
     /// Vertices that a camera's frustum holds, of those shown, places counted each.
     pub fn visible_vertices(&self, camera: &Camera) -> usize {
-        let frustum = camera.frustum();
-        let mut count = 0;
-        for (view, places) in self.views.iter().zip(&self.places) {
-            for p in view.vertices().filter_map(|v| view.position(v)) {
-                count += places.iter().filter(|m| frustum.contains(m.transform_point3(p))).count();
-            }
-        }
-        count
+        shared::visible_vertices(self.views.iter(), &self.places, camera)
     }
 }

@@ -1,6 +1,6 @@
 //! A scene refined where a camera needs it, by the rule of truly selective refinement.
 
-use super::{SelectiveScene, tolerance};
+use super::{SelectiveScene, shared};
 use crate::progressive::Leftover;
 use crate::refine::selective::{Cull, Done, Lens, LensError, Limits};
 use crate::refine::truly::{Guarded, TrulyError, TrulyView};
@@ -62,20 +62,19 @@ impl TrulyScene {
 
     /// Faces shown, of all meshes, each counted once.
     pub fn face_count(&self) -> usize {
-        self.views.iter().map(TrulyView::face_count).sum()
+        shared::face_count(self.views.iter())
     }
 
     /// Vertices shown.
     pub fn vertex_count(&self) -> usize {
-        self.views.iter().map(TrulyView::vertex_count).sum()
+        shared::vertex_count(self.views.iter())
     }
 
     /// What the flip guard did in the last frame.
     pub fn guarded(&self) -> Guarded {
-        self.views.iter().map(TrulyView::guarded).fold(Guarded::default(), |a, b| Guarded {
-            deferred: a.deferred + b.deferred,
-            through: a.through + b.through,
-            turned: a.turned + b.turned,
+        self.views.iter().fold(Guarded::default(), |mut all, v| {
+            all += v.guarded();
+            all
         })
     }
 
@@ -89,20 +88,15 @@ impl TrulyScene {
         cull: Cull,
         limits: &Limits<'_>,
     ) -> Result<Done, TrulySceneError> {
-        let mut all = Done { complete: true, ..Done::default() };
+        let mut all = Done::NOTHING;
         for mesh in 0..self.views.len() {
             let h = self.views[mesh].hierarchy();
-            let lenses = self.places[mesh].iter().map(|p| Lens::new(h, camera, p, tau, cull));
-            let lenses: Result<Vec<Lens>, LensError> = lenses.collect();
-            let lenses = lenses.map_err(|source| TrulySceneError::Lens { mesh, source })?;
+            let lens = |p: &DMat4| Lens::new(h, camera, p, tau, cull);
+            let failed = |source| TrulySceneError::Lens { mesh, source };
+            let lenses = shared::lenses(&self.places[mesh], lens, failed)?;
             let others = self.face_count() - self.views[mesh].face_count();
             let limits = Limits { faces: limits.faces.saturating_sub(others), ..*limits };
-            let done = self.views[mesh].adapt_to_all(&lenses, &limits);
-            all.splits += done.splits;
-            all.collapses += done.collapses;
-            all.forced += done.forced;
-            all.refused += done.refused;
-            all.complete &= done.complete;
+            all += self.views[mesh].adapt_to_all(&lenses, &limits);
         }
         Ok(all)
     }
@@ -118,11 +112,8 @@ impl TrulyScene {
         cull: Cull,
         faces: Option<usize>,
     ) -> Result<f64, TrulySceneError> {
-        let most = faces.unwrap_or(usize::MAX);
-        tolerance::least(tau, |tau| {
-            self.adapt(camera, tau, cull, &Limits::default())?;
-            Ok(self.face_count() <= most)
-        })
+        let adapt = |s: &mut Self, tau| s.adapt(camera, tau, cull, &Limits::default()).map(|_| true);
+        shared::extract(self, (tau, faces), adapt, Self::face_count)
     }
 
     /// Bytes of the index buffers, and vertices, that changed since this was last called.
@@ -133,44 +124,17 @@ impl TrulyScene {
 
     /// The scene as it is shown. At full detail it is the scene that was made progressive, bit for bit. O(n).
     pub fn to_scene(&self) -> Scene {
-        let mut scene = self.shell.clone();
-        scene.meshes.resize_with(self.views.len(), Default::default);
-        let all = self.views.iter().all(|v| v.vertex_count() == v.hierarchy().mesh().vertices());
-        for (i, view) in self.views.iter().enumerate() {
-            let geometry = view.to_input();
-            let ordered = view.hierarchy().mesh().order.is_some();
-            scene.meshes[i].geometry = match self.leftovers.get(i).filter(|_| all && ordered) {
-                Some(left) => left.put_back(geometry),
-                None => geometry,
-            };
-        }
-        scene
+        shared::scene_of(&self.shell, &self.leftovers, &self.views.iter().collect::<Vec<_>>())
     }
 
     /// The triangles shown, in the world: three corners each.
     pub fn triangles(&self) -> Vec<[DVec3; 3]> {
-        let mut out = Vec::new();
-        for (view, places) in self.views.iter().zip(&self.places) {
-            let slots = (0..view.indices().len()).filter(|&s| view.face_in(s).is_some());
-            let at = |v: u32| view.position(v).unwrap_or_default();
-            let own: Vec<[DVec3; 3]> = slots.map(|s| view.indices()[s].map(at)).collect();
-            for m in places {
-                out.extend(own.iter().map(|t| t.map(|p| m.transform_point3(p))));
-            }
-        }
-        out
+        shared::triangles(self.views.iter(), &self.places)
     }
 
     /// Vertices that a camera's frustum holds, of those shown, places counted each.
     pub fn visible_vertices(&self, camera: &Camera) -> usize {
-        let frustum = camera.frustum();
-        let mut count = 0;
-        for (view, places) in self.views.iter().zip(&self.places) {
-            for p in (0..view.hierarchy().mesh().vertices() as u32).filter_map(|v| view.position(v)) {
-                count += places.iter().filter(|m| frustum.contains(m.transform_point3(p))).count();
-            }
-        }
-        count
+        shared::visible_vertices(self.views.iter(), &self.places, camera)
     }
 
     /// Bytes that all views share, bytes of the views that grow with what is shown, and bytes of their tables over the finest meshes.

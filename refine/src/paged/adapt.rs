@@ -39,6 +39,27 @@ pub struct PagedDone {
     pub fetched: usize,
 }
 
+impl PagedDone {
+    /// Nothing to do: what sums begin with.
+    pub const NOTHING: PagedDone = PagedDone { done: Done::NOTHING, no_room: 0, postponed: 0, fetched: 0 };
+
+    /// What was done, without what was left out: of an attempt that is made again.
+    pub fn so_far(self) -> PagedDone {
+        let done = Done { refused: 0, complete: true, ..self.done };
+        PagedDone { done, no_room: 0, postponed: 0, ..self }
+    }
+}
+
+/// Of several meshes: complete if all are.
+impl std::ops::AddAssign for PagedDone {
+    fn add_assign(&mut self, other: PagedDone) {
+        self.done += other.done;
+        self.no_room += other.no_room;
+        self.postponed += other.postponed;
+        self.fetched += other.fetched;
+    }
+}
+
 /// What a frame did, and what is left of its limits.
 struct Frame<'a> {
     meter: Meter<'a>,

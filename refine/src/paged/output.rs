@@ -4,6 +4,7 @@ use super::PagedView;
 use crate::Strips;
 use crate::aif::{MeshInput, NONE, Positions, Wedges};
 use crate::format::ByteRanges;
+use crate::selective::take_runs;
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
@@ -57,21 +58,7 @@ impl<S: ByteRanges> PagedView<S> {
     /// Runs of slots of the index buffer that changed since this was last called, ascending (a few unchanged ones between two may be in), and how many wedges are new or
     /// have other values, at most.
     pub fn take_changes(&mut self) -> (Vec<Range<usize>>, usize) {
-        /// Unchanged slots that may lie within a run: as in [`crate::selective`].
-        const GAP: usize = 4;
-        let mut runs: Vec<Range<usize>> = Vec::new();
-        for (k, word) in self.touched.iter_mut().enumerate().filter(|(_, w)| **w != 0) {
-            let mut bits = std::mem::take(word);
-            while bits != 0 {
-                let slot = 64 * k + bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                match runs.last_mut() {
-                    Some(last) if slot <= last.end + GAP => last.end = slot + 1,
-                    _ => runs.push(slot..slot + 1),
-                }
-            }
-        }
-        (runs, std::mem::take(&mut self.touched_wedges))
+        (take_runs(&mut self.touched), std::mem::take(&mut self.touched_wedges))
     }
 
     /// The faces shown as triangle strips over the wedges of [`PagedView::indices`]. Takes memory of its own beside the limit. O(faces shown).

@@ -41,6 +41,22 @@ pub struct Done {
     pub refused: usize,
 }
 
+impl Done {
+    /// Nothing to do: what sums begin with.
+    pub const NOTHING: Done = Done { splits: 0, collapses: 0, forced: 0, complete: true, refused: 0 };
+}
+
+/// Of several meshes: complete if all are.
+impl std::ops::AddAssign for Done {
+    fn add_assign(&mut self, other: Done) {
+        self.splits += other.splits;
+        self.collapses += other.collapses;
+        self.forced += other.forced;
+        self.complete &= other.complete;
+        self.refused += other.refused;
+    }
+}
+
 /// Operations between two questions for the time.
 const BETWEEN: usize = 64;
 /// Looks at splits that count as many operations: a look takes about a tenth of an operation's time.

@@ -16,6 +16,15 @@ pub struct Guarded {
     pub turned: usize,
 }
 
+/// Of several meshes.
+impl std::ops::AddAssign for Guarded {
+    fn add_assign(&mut self, other: Guarded) {
+        self.deferred += other.deferred;
+        self.through += other.through;
+        self.turned += other.turned;
+    }
+}
+
 /// Attempts to turn back what a split turned.
 const TURNS: usize = 32;
 

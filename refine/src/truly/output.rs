@@ -5,10 +5,6 @@ use crate::aif::{MeshInput, NONE, Positions, Wedges};
 use crate::selective::Changes;
 use glam::DVec3;
 use std::collections::HashMap;
-use std::ops::Range;
-
-/// Unchanged faces that may lie within a run, as of [`crate::selective::View::take_changes`].
-const GAP: usize = 4;
 
 impl TrulyView {
     /// The index buffer: three vertices a slot, by their numbers at full detail. A slot without a face has three equal corners.
@@ -28,23 +24,8 @@ impl TrulyView {
 
     /// What changed in the index buffer since this was last called, or since the view was made, and which vertices are new or moved (in place of wedges). O(slots / 64 + changes).
     pub fn take_changes(&mut self) -> Changes {
-        let mut faces: Vec<Range<usize>> = Vec::new();
-        for (k, word) in self.mesh.touched.iter_mut().enumerate().filter(|(_, w)| **w != 0) {
-            let mut bits = std::mem::take(word);
-            while bits != 0 {
-                let slot = 64 * k + bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                match faces.last_mut() {
-                    Some(last) if slot <= last.end + GAP => last.end = slot + 1,
-                    _ => faces.push(slot..slot + 1),
-                }
-            }
-        }
-        let mut wedges = std::mem::take(&mut self.mesh.moved);
-        wedges.sort_unstable();
-        wedges.dedup();
         let now = self.mesh.corners().len();
-        Changes { faces, wedges, slots: [std::mem::replace(&mut self.slots_before, now), now] }
+        Changes::take(&mut self.mesh.touched, &mut self.mesh.moved, &mut self.slots_before, now)
     }
 
     /// The mesh as flat arrays: vertices and faces that are shown, numbered in the order of the progressive mesh; wedges in the order of the faces. If every split is applied, this is

@@ -1,10 +1,15 @@
-//! What the tests of this crate share: sample meshes, and comparison bit for bit.
+//! What the tests of this crate share: sample meshes, comparison bit for bit; random numbers, cameras and what a view needs by the book.
 #![allow(dead_code, unreachable_pub, reason = "each test file uses its part")]
 
+use glam::DVec3;
 use progmesh_meshes::{GenerateOptions, Sample, generate};
+use progmesh_refine::ProgressiveMesh;
 use progmesh_refine::aif::*;
-use progmesh_refine::progressive::same_positions;
-use progmesh_refine::simplify::{Method, Options, Placement};
+use progmesh_refine::hierarchy::Hierarchy;
+use progmesh_refine::progressive::{build, same_positions};
+use progmesh_refine::selective::Lens;
+use progmesh_refine::simplify::{Method, Options, Placement, Quiet};
+use progmesh_refine::view::{Camera, CameraParameters, Projection};
 
 /// The well-formed samples.
 pub const NAMES: [&str; 8] =
@@ -71,4 +76,69 @@ pub fn assert_same(a: &MeshInput, b: &MeshInput) {
         assert_eq!(x.corner, y.corner);
         assert_eq!(bits(x), bits(y));
     }
+}
+
+/// A sample with all its collapses recorded.
+pub fn progressive(
+    name: &str,
+    faces: usize,
+    method: Method,
+    placement: Option<Placement>,
+) -> ProgressiveMesh {
+    build(sample(name, faces, 5), &options(method, placement), &Quiet).unwrap().mesh
+}
+
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((self.0 >> 33) as usize) % n.max(1)
+    }
+
+    pub fn unit(&mut self) -> f64 {
+        self.below(1 << 30) as f64 / (1u64 << 30) as f64
+    }
+
+    /// A vector that is neither long nor short.
+    fn ball(&mut self) -> DVec3 {
+        loop {
+            let p = DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0;
+            if p.length() < 1.0 && p.length() > 0.1 {
+                return p;
+            }
+        }
+    }
+}
+
+/// At so many diagonals from the middle, looking at the mesh.
+pub fn any_camera(h: &Hierarchy, random: &mut Random, distance: f64, projection: Projection) -> Camera {
+    let (centre, size) = h.extent();
+    Camera::new(&CameraParameters {
+        eye: centre + random.ball().normalize() * size * distance,
+        target: centre + random.ball() * 0.3 * size,
+        up: random.ball(),
+        projection,
+        width: 640,
+        height: 480,
+        near: 0.01 * size,
+        far: 10.0 * size,
+    })
+    .unwrap()
+}
+
+/// For every split whether it is in the least closed set: needed, wherever its vertex is, or one that such a split depends on.
+pub fn least_closed<D: Iterator<Item = usize>>(
+    h: &Hierarchy,
+    lens: &Lens,
+    dependencies: impl Fn(usize) -> D,
+) -> Vec<bool> {
+    let mut want = vec![false; h.splits()];
+    for i in (0..h.splits()).rev() {
+        want[i] |= lens.needs(h, i);
+        if want[i] {
+            dependencies(i).for_each(|d| want[d] = true);
+        }
+    }
+    want
 }

@@ -4,13 +4,13 @@ use super::super::Failure;
 use super::super::control::Interrupt;
 use super::super::paging::{self, Paging};
 use super::Args;
+use super::pace::Pace;
 use super::path::Source;
 use super::report::{Frame, Memory, Report};
 use progmesh::refine::paged::PagedLimits;
-use progmesh::refine::selective::{Limits, Regulator};
 use progmesh::refine::view::Camera;
 use progmesh::selective::PagedScene;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 impl Args {
     pub(super) fn run_paged(
@@ -63,48 +63,27 @@ impl Args {
         most: &mut usize,
     ) -> Result<Vec<Frame>, Failure> {
         let file = self.input.name();
-        let mut regulator = self.needs.budget_faces.map(|n| Regulator::new(n, self.needs.tau));
+        let mut pace = Pace::new(self.setting(self.needs.tau, interrupt));
+        let fetches = self.fetches.unwrap_or(usize::MAX);
         let mut frames = Vec::with_capacity(path.len());
         scene.take_changes();
         for camera in path {
-            if interrupt.is_set() {
-                return Err(Failure::Interrupted);
-            }
-            let tau = regulator.as_ref().map_or(self.needs.tau, |r| r.tau());
-            let start = Instant::now();
-            let end = self.budget_us.map(|us| start + Duration::from_micros(us as u64));
-            let expired = || end.is_some_and(|end| Instant::now() >= end);
-            let limits = Limits {
-                faces: self.needs.budget_faces.unwrap_or(usize::MAX),
-                expired: end.is_some().then_some(&expired as &dyn Fn() -> bool),
-                hysteresis: self.hysteresis,
-                ..Limits::default()
-            };
-            let limits = PagedLimits { limits, fetches: self.fetches.unwrap_or(usize::MAX) };
-            let done = scene.adapt(camera, tau, self.needs.cull(), &limits);
-            let done = done.map_err(|e| Failure::Input(format!("{file}: {e}")))?;
-            let us = start.elapsed().as_secs_f64() * 1e6;
+            let timed = pace.frame(&file, |tau, cull, limits| {
+                scene.adapt(camera, tau, cull, &PagedLimits { limits: *limits, fetches })
+            })?;
+            let done = timed.done;
             *most = scene.bytes().max(*most);
-            if let Some(r) = &mut regulator {
-                r.note(scene.face_count(), &done.done);
-            }
+            pace.note(scene.face_count(), &done.done);
             let (dirty_index_bytes, dirty_wedges) = scene.take_changes();
             frames.push(Frame {
                 faces: scene.face_count(),
                 vertices: scene.vertex_count(),
-                vsplits: done.done.splits,
-                ecols: done.done.collapses,
-                us,
-                tau: tau.is_finite().then_some(tau),
-                complete: done.done.complete,
-                morphing: 0,
                 visible_vertices: scene.visible_vertices(camera),
                 dirty_index_bytes,
                 dirty_wedges,
                 fetched: Some(done.fetched),
                 no_room: Some(done.no_room),
-                measured: None,
-                on_ground: None,
+                ..timed.frame(&done.done)
             });
         }
         Ok(frames)

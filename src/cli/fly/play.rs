@@ -82,7 +82,8 @@ impl Playing<'_> {
     }
 
     pub(super) fn take(&mut self, step: &Step<'_>) -> Result<(), Failure> {
-        let counts = FrameCounts { splits: step.done.splits, collapses: step.done.collapses, tau: step.tau };
+        let (done, tau) = (step.timed.done, step.timed.tau);
+        let counts = FrameCounts { splits: done.splits, collapses: done.collapses, tau };
         self.recorder.note(step.scene, step.changes);
         if !step.number.is_multiple_of(self.stride) {
             self.recorder.skip(&counts);

@@ -36,7 +36,7 @@ pub(super) struct Report {
 }
 
 /// A frame.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub(super) struct Frame {
     pub(super) faces: usize,
     pub(super) vertices: usize,

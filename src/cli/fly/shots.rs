@@ -57,13 +57,13 @@ pub(super) struct Shots<'a> {
 }
 
 impl ShotArgs {
-    /// Fails, before any work is done, where nothing could be written.
     /// A flag that was given, if any was.
     pub(super) fn given(&self) -> Option<&'static str> {
         let png = self.png_every.map(|_| "--png-every");
         png.or(self.apng.as_ref().map(|_| "--apng"))
     }
 
+    /// Fails, before any work is done, where nothing could be written.
     pub(super) fn check(&self) -> Result<(), Failure> {
         if let Some(w) = self.png_width.filter(|w| !(SIDES[0]..=SIDES[1]).contains(w)) {
             return Err(Failure::Usage(format!("--png-width {w}: must be {} to {}", SIDES[0], SIDES[1])));

@@ -1,0 +1,147 @@
+//! What is the same for every frame, whatever the engine: its tolerance, its limits, its time, and what is measured of it.
+
+use super::super::Failure;
+use super::super::control::Interrupt;
+use super::path::Course;
+use super::report::{Frame, Measured, OnGround};
+use glam::DVec3;
+use progmesh::refine::selective::{Cull, Done, Limits, Regulator};
+use progmesh::refine::view::Camera;
+use progmesh::selective::{Ground, Judge, SelectiveScene};
+use std::time::{Duration, Instant};
+
+/// How a flight refines.
+#[derive(Clone, Copy)]
+pub(super) struct Setting<'a> {
+    pub(super) tau: f64,
+    pub(super) cull: Cull,
+    pub(super) budget_faces: Option<usize>,
+    pub(super) budget_us: Option<usize>,
+    pub(super) hysteresis: f64,
+    pub(super) interrupt: &'a Interrupt,
+}
+
+/// Goes from frame to frame.
+pub(super) struct Pace<'a> {
+    setting: Setting<'a>,
+    regulator: Option<Regulator>,
+}
+
+/// A frame that has been refined.
+#[derive(Clone, Copy)]
+pub(super) struct Timed<T> {
+    /// The tolerance of this frame.
+    pub(super) tau: f64,
+    /// What refining took, microseconds.
+    pub(super) us: f64,
+    pub(super) done: T,
+}
+
+impl<'a> Pace<'a> {
+    pub(super) fn new(setting: Setting<'a>) -> Self {
+        Pace { setting, regulator: setting.budget_faces.map(|n| Regulator::new(n, setting.tau)) }
+    }
+
+    /// One frame: `adapt` is given its tolerance, what to cull and its limits, and is timed.
+    ///
+    /// Errors: those of `adapt`, which are the input's; an interruption.
+    pub(super) fn frame<T, E: std::fmt::Display>(
+        &self,
+        file: &str,
+        adapt: impl FnOnce(f64, Cull, &Limits<'_>) -> Result<T, E>,
+    ) -> Result<Timed<T>, Failure> {
+        let s = &self.setting;
+        if s.interrupt.is_set() {
+            return Err(Failure::Interrupted);
+        }
+        let tau = self.regulator.as_ref().map_or(s.tau, Regulator::tau);
+        let start = Instant::now();
+        let end = s.budget_us.map(|us| start + Duration::from_micros(us as u64));
+        let expired = || end.is_some_and(|end| Instant::now() >= end);
+        let limits = Limits {
+            faces: s.budget_faces.unwrap_or(usize::MAX),
+            expired: end.is_some().then_some(&expired as &dyn Fn() -> bool),
+            hysteresis: s.hysteresis,
+            ..Limits::default()
+        };
+        let done = adapt(tau, s.cull, &limits);
+        let us = start.elapsed().as_secs_f64() * 1e6;
+        let done = done.map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+        Ok(Timed { tau, us, done })
+    }
+
+    /// What came of the frame, for the tolerance of the next.
+    pub(super) fn note(&mut self, faces: usize, done: &Done) {
+        if let Some(r) = &mut self.regulator {
+            r.note(faces, done);
+        }
+    }
+}
+
+impl<T> Timed<T> {
+    /// What a report says of it; what is shown, and what changed, is to be filled in.
+    pub(super) fn frame(&self, done: &Done) -> Frame {
+        Frame {
+            vsplits: done.splits,
+            ecols: done.collapses,
+            us: self.us,
+            tau: self.tau.is_finite().then_some(self.tau),
+            complete: done.complete,
+            ..Frame::default()
+        }
+    }
+}
+
+/// What is measured on every so many frames.
+pub(super) struct Measuring<'a> {
+    every: Option<usize>,
+    judge: Option<Judge>,
+    ground: Option<&'a Ground<'a>>,
+    file: &'a str,
+}
+
+impl<'a> Measuring<'a> {
+    /// With so many samples of the finest surfaces of `scene`; over terrain with those of its grid.
+    ///
+    /// Errors: a damaged mesh.
+    pub(super) fn new(
+        every: Option<usize>,
+        scene: &SelectiveScene,
+        samples: usize,
+        course: &'a Course<'_>,
+        file: &'a str,
+    ) -> Result<Self, Failure> {
+        let judge = match every.filter(|_| course.ground.is_none()) {
+            Some(_) => {
+                let judge = Judge::new(scene, samples);
+                Some(judge.map_err(|e| Failure::Input(format!("{file}: {e}")))?)
+            }
+            None => None,
+        };
+        Ok(Measuring { every, judge, ground: course.ground.as_ref(), file })
+    }
+
+    /// Measures frame `number`, if it is its turn; `triangles` is asked for what is shown then.
+    ///
+    /// Errors: what is shown cannot be measured.
+    pub(super) fn measure(
+        &self,
+        number: usize,
+        camera: &Camera,
+        triangles: impl FnOnce() -> Vec<[DVec3; 3]>,
+    ) -> Result<(Option<Measured>, Option<OnGround>), Failure> {
+        if self.every.is_none_or(|n| !number.is_multiple_of(n)) {
+            return Ok((None, None));
+        }
+        let triangles = triangles();
+        let measured = match &self.judge {
+            Some(j) => {
+                let m = j.measure_triangles(&triangles, camera);
+                let m = m.map_err(|e| Failure::Input(format!("{}: {e}", self.file)))?;
+                Some(Measured { samples: m.visible, max_pixels: m.max_pixels, mean_pixels: m.mean_pixels })
+            }
+            None => None,
+        };
+        Ok((measured, self.ground.map(|g| OnGround::of(&g.judge(&triangles, camera)))))
+    }
+}
