@@ -3,11 +3,13 @@
 use crate::lines::MeshLine;
 use crate::meshes;
 use crate::one;
+use crate::plan::ratio;
 use crate::raw::{Raw, digest};
 use crate::results::{Results, name};
 use crate::tools::{Places, find, output};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// MeshLab's samples on each side.
@@ -72,16 +74,59 @@ pub(crate) fn published(all: &Results, ratios: &[f64], meshes: &[&MeshLine]) -> 
     out
 }
 
-/// Lets MeshLab compute every published figure again; false if one differs. `ratios`: only these; empty for all. `quick`: only the meshes of a
-/// quick run.
+/// What of the published figures is to be checked.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Only {
+    meshes: Vec<String>,
+    tools: Vec<String>,
+    ratios: Vec<f64>,
+}
+
+impl Only {
+    /// Words name meshes, tools and ratios; of a kind that no word names, all. Errors: a word that names nothing that was published.
+    pub(crate) fn new(words: &[String], all: &[Published]) -> Result<Only> {
+        let mut only = Only::default();
+        for word in words {
+            if word.ends_with('%') {
+                only.ratios.push(ratio(word)?);
+            } else if all.iter().any(|p| p.mesh == *word) {
+                only.meshes.push(word.clone());
+            } else if all.iter().any(|p| p.tool == *word) {
+                only.tools.push(word.clone());
+            } else {
+                let names = |of: fn(&Published) -> &str| {
+                    let names: BTreeSet<&str> = all.iter().map(of).collect();
+                    Vec::from_iter(names).join(", ")
+                };
+                bail!(
+                    "--only {word}: no such mesh or tool was published; meshes are {}; tools are {}; ratios are written 10%",
+                    names(|p| &p.mesh),
+                    names(|p| &p.tool)
+                );
+            }
+        }
+        Ok(only)
+    }
+
+    fn holds_all(&self) -> bool {
+        self.meshes.is_empty() && self.tools.is_empty() && self.ratios.is_empty()
+    }
+
+    fn holds(&self, p: &Published) -> bool {
+        (self.meshes.is_empty() || self.meshes.contains(&p.mesh))
+            && (self.tools.is_empty() || self.tools.contains(&p.tool))
+            && (self.ratios.is_empty() || self.ratios.contains(&p.ratio))
+    }
+}
+
+/// Lets MeshLab compute the published figures again; false if one differs. `quick`: only the meshes of a quick run.
 pub(crate) fn check(
     places: &Places,
     all: &[Published],
-    ratios: &[f64],
+    only: &Only,
     quick: bool,
     folder: &Path,
 ) -> Result<bool> {
-    ensure!(!all.is_empty(), "nothing was published yet: bench/run --publish");
     places
         .version(find("meshlab").context("no such tool")?)
         .map_err(|e| anyhow::anyhow!("no MeshLab: {e}"))?;
@@ -102,7 +147,7 @@ pub(crate) fn check(
         "{:<12} {:>5}  {:<40} {:>20} {:>20}  verdict",
         "mesh", "kept", "method", "mean: off by", "rms: off by"
     );
-    for p in wanted(all, ratios, quick.then_some(&names)) {
+    for p in wanted(all, only, quick.then_some(&names)) {
         let Some((_, original)) = loaded.iter().find(|l| l.0 == p.digest) else {
             println!("{:<12} is not here, or has changed", p.mesh);
             continue;
@@ -136,21 +181,20 @@ pub(crate) fn check(
     ensure!(
         judged > 0,
         "nothing could be judged: of what was published, {} figures are of {}{}",
-        wanted(all, ratios, quick.then_some(&names)).count(),
+        wanted(all, only, quick.then_some(&names)).count(),
         if quick { "the meshes of a quick run" } else { "any mesh" },
-        if ratios.is_empty() { "" } else { " at these ratios" }
+        if only.holds_all() { "" } else { ", of those that --only names" }
     );
     Ok(good)
 }
 
-/// What is to be checked: at these ratios (none: at all), of these meshes.
+/// What is to be checked, of these meshes.
 fn wanted<'a>(
     all: &'a [Published],
-    ratios: &'a [f64],
+    only: &'a Only,
     meshes: Option<&'a Vec<String>>,
 ) -> impl Iterator<Item = &'a Published> {
-    let at = |p: &&Published| ratios.is_empty() || ratios.contains(&p.ratio);
-    all.iter().filter(at).filter(move |p| meshes.is_none_or(|m| m.contains(&p.mesh)))
+    all.iter().filter(|p| only.holds(p)).filter(move |p| meshes.is_none_or(|m| m.contains(&p.mesh)))
 }
 
 fn meshlab(places: &Places, paths: &[std::path::PathBuf; 2]) -> Result<Vec<Theirs>> {
@@ -211,9 +255,17 @@ mod tests {
         };
         let all = [p("bunny", 0.1), p("dragon", 0.1), p("bunny", 0.5)];
         let few = vec!["bunny".to_string()];
-        assert_eq!(wanted(&all, &[], None).count(), 3);
-        assert_eq!(wanted(&all, &[], Some(&few)).count(), 2);
-        assert_eq!(wanted(&all, &[0.5], Some(&few)).count(), 1);
+        let count = |words: &[&str], meshes| {
+            let words: Vec<String> = words.iter().map(|w| w.to_string()).collect();
+            wanted(&all, &Only::new(&words, &all).unwrap(), meshes).count()
+        };
+        assert_eq!(count(&[], None), 3);
+        assert_eq!(count(&[], Some(&few)), 2);
+        assert_eq!(count(&["50%"], Some(&few)), 1);
+        assert_eq!(count(&["dragon", "quadric"], None), 1);
+        let text = Only::new(&["cow".to_string()], &all).unwrap_err().to_string();
+        assert!(text.contains("cow") && text.contains("bunny, dragon") && text.contains("quadric"), "{text}");
+        assert!(Only::new(&["0%".to_string()], &all).is_err());
     }
 
     #[test]

@@ -130,8 +130,8 @@ struct Check {
     /// Only the meshes of a quick run.
     #[arg(long)]
     quick: bool,
-    /// Only these ratios (10%).
-    #[arg(long, value_delimiter = ',', value_name = "RATIOS")]
+    /// Only these meshes, tools, ratios: bunny,quadric,10%.
+    #[arg(long, value_delimiter = ',', value_name = "WORDS")]
     only: Vec<String>,
     #[command(flatten)]
     places: Where,
@@ -203,10 +203,11 @@ fn command(command: Command) -> Result<ExitCode> {
         }
         Command::Check(c) => {
             let (places, out) = c.places.places();
-            let ratios = c.only.iter().map(|w| plan::ratio(w)).collect::<Result<Vec<f64>>>()?;
             let text = std::fs::read_to_string(places.bench.join(PUBLISHED)).unwrap_or("[]".into());
             let published: Vec<check::Published> = serde_json::from_str(&text).context(PUBLISHED)?;
-            return Ok(good(check::check(&places, &published, &ratios, c.quick, &out.folder)?));
+            ensure!(!published.is_empty(), "nothing was published yet: bench/run --publish");
+            let only = check::Only::new(&c.only, &published)?;
+            return Ok(good(check::check(&places, &published, &only, c.quick, &out.folder)?));
         }
         Command::Validate(v) => {
             let (places, out) = v.places.places();

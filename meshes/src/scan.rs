@@ -9,6 +9,8 @@ use glam::DVec3;
 pub(crate) const DEFAULT_FACES: usize = 20_000;
 /// Holes in the surface, each bounded by one border loop.
 const HOLES: usize = 6;
+/// Faces for every hole: below 6 times as many there are fewer holes, which would eat the surface.
+const FACES_PER_HOLE: usize = 60;
 /// Part of the faces that the holes take, about: asked for so much more, the rest comes out as asked.
 const HOLE_SHARE: f64 = 0.06;
 
@@ -58,7 +60,7 @@ fn punch(points: &[DVec3], triangles: Vec<[u32; 3]>, random: &mut SplitMix64, se
     let centre = |f: usize| triangles[f].iter().map(|&v| points[v as usize]).sum::<DVec3>().normalize();
     let mut centres: Vec<DVec3> = Vec::with_capacity(HOLES);
     let mut gone = vec![false; triangles.len()];
-    for hole in 0..HOLES {
+    for hole in 0..HOLES.min(triangles.len() / FACES_PER_HOLE) {
         // Of several places, the one farthest from the other holes: they must not grow together.
         let distance = |d: &DVec3| centres.iter().map(|c| c.distance(*d)).fold(f64::INFINITY, f64::min);
         let at = (0..40).map(|_| random.direction()).fold(None, |best: Option<DVec3>, d| match best {
@@ -165,4 +167,22 @@ fn drop_unused(points: &[DVec3], mut triangles: Vec<[u32; 3]>) -> (Vec<DVec3>, V
         .collect();
     triangles.as_flattened_mut().iter_mut().for_each(|v| *v = map[*v as usize]);
     (points.iter().zip(&used).filter(|p| *p.1).map(|p| *p.0).collect(), triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn holes_leave_most_of_a_coarse_scan() {
+        for faces in [1, 20, 30, 80, 180, 320, 500, 720] {
+            for seed in (0..100).chain([864]) {
+                let (left, whole) = (
+                    scan(faces, seed).corners.len() / 3,
+                    20 * frequency((faces as f64 * (1.0 + HOLE_SHARE)) as usize).pow(2) as usize,
+                );
+                assert!(2 * left > whole, "{faces} faces, seed {seed}: {left} of {whole} are left");
+            }
+        }
+    }
 }
