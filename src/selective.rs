@@ -3,6 +3,7 @@
 mod flight;
 mod heights;
 mod judge;
+mod judge_directional;
 mod morph;
 mod paged;
 mod player;
@@ -44,6 +45,18 @@ pub struct SelectiveScene {
     /// For each mesh where it stands.
     places: Vec<Vec<DMat4>>,
     morphs: Morphs,
+    deviation: Deviation,
+}
+
+/// How deviations from the finest mesh count in a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Deviation {
+    /// By their length, whichever way they lie.
+    #[default]
+    Uniform,
+    /// What lies along the line of sight counts a quarter ([`Lens::directional`]). It takes bounds with directions ([`Options::directions`]).
+    Directional,
 }
 
 /// A mesh of a scene cannot be refined selectively.
@@ -95,7 +108,8 @@ impl SelectiveScene {
         });
         let views = each.collect::<Result<_, _>>()?;
         let morphs = Morphs::default();
-        Ok(SelectiveScene { views, places, shell: scene.shell, leftovers: scene.leftovers, morphs })
+        let deviation = Deviation::default();
+        Ok(SelectiveScene { views, places, shell: scene.shell, leftovers: scene.leftovers, morphs, deviation })
     }
 
     /// The views, one a mesh: what the last frame asked for.
@@ -113,6 +127,11 @@ impl SelectiveScene {
     /// to rest, but [`SelectiveScene::shown`].
     pub fn set_geomorph(&mut self, geomorph: Option<Geomorph>) {
         self.morphs = Morphs::new(geomorph);
+    }
+
+    /// How errors count from the next frame on.
+    pub fn set_deviation(&mut self, deviation: Deviation) {
+        self.deviation = deviation;
     }
 
     /// Vertices of the last frame that are not where they will be.
@@ -211,7 +230,10 @@ impl SelectiveScene {
     pub fn lenses(&self, camera: &Camera, tau: f64, cull: Cull) -> Result<Vec<Vec<Lens>>, SelectiveError> {
         let of = |m: usize| {
             let h = self.views[m].hierarchy();
-            let lens = |p: &DMat4| Lens::new(h, camera, p, tau, cull);
+            let lens = |p: &DMat4| {
+                let lens = Lens::new(h, camera, p, tau, cull)?;
+                Ok(if self.deviation == Deviation::Directional { lens.directional() } else { lens })
+            };
             shared::lenses(&self.places[m], lens, |source| SelectiveError::Lens { mesh: m, source })
         };
         (0..self.views.len()).map(of).collect()

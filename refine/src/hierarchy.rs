@@ -14,6 +14,7 @@
 mod bounds;
 mod cone;
 mod deviation;
+mod directions;
 mod forest;
 mod offsets;
 mod rings;
@@ -25,6 +26,7 @@ mod tree;
 pub use bounds::{Bounds, Guarantee, SplitBounds};
 pub(crate) use bounds::{Packed, pack_up, unpack};
 pub(crate) use cone::Cone;
+pub(crate) use directions::{CHANGE, DEPTH, Direction};
 pub(crate) use forest::Forest;
 pub(crate) use rows::SplitRows;
 pub(crate) use tree::Tree;
@@ -59,15 +61,17 @@ pub struct Options {
     pub rounds: u32,
     /// Samples of the finest mesh that are followed on each face, on average; where there are more, those of edges are left out, then vertices. At most so many take up time.
     pub samples: usize,
+    /// By the ring rule: finds out which way deviations lie, for directional errors ([`crate::selective::Lens::directional`]). 2 B a split.
+    pub directions: bool,
 }
 
 impl Options {
     /// By the ring rule. At a margin of 1 ten views each at tolerances of 0.3, 1 and 4 pixels showed up to 1.19 of it with 100 samples (horse, the textured bunny), up to 1.33 with 60
     /// (also fandisk, igea and bunny), up to 1.67 with 12 (horse). `docs/selective.md` has what was measured with these values.
-    pub const RINGS: Options = Options { rule: Rule::Rings, margin: 1.35, rounds: 1, samples: 100 };
+    pub const RINGS: Options = Options { rule: Rule::Rings, margin: 1.35, rounds: 1, samples: 100, directions: false };
     /// By the rule of cuts. At a margin of 1 with two rounds views of five sample meshes (`tests/selective.rs`) showed up to 1.4 of the tolerance, of dragon, igea, horse and the
     /// textured bunny up to 2.0 (their medians about 1.2); without rounds more.
-    pub const CUTS: Options = Options { rule: Rule::Cuts, margin: 2.25, rounds: 2, samples: 12 };
+    pub const CUTS: Options = Options { rule: Rule::Cuts, margin: 2.25, rounds: 2, samples: 12, directions: false };
 
     /// Sets [`Options::margin`].
     pub fn with_margin(mut self, margin: f64) -> Self {
@@ -78,6 +82,12 @@ impl Options {
     /// Sets [`Options::samples`].
     pub fn with_samples(mut self, samples: usize) -> Self {
         self.samples = samples;
+        self
+    }
+
+    /// Sets [`Options::directions`].
+    pub fn with_directions(mut self, directions: bool) -> Self {
+        self.directions = directions;
         self
     }
 
@@ -313,6 +323,12 @@ impl Hierarchy {
     /// The bounds of all splits.
     pub fn all_bounds(&self) -> &Arc<Bounds> {
         &self.bounds
+    }
+
+    /// Which way deviations of split `i` lie.
+    #[inline]
+    pub(crate) fn direction(&self, i: u32) -> Direction {
+        self.bounds.directions.get(i as usize).copied().unwrap_or_default()
     }
 
     /// Where split `i` is, about the origin of the bounds, as everything is that is decided about it.

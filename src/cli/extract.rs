@@ -140,7 +140,8 @@ pub(crate) fn make(
     interrupt.be_graceful();
     let (read_seconds, start) = (start.elapsed().as_secs_f64(), Instant::now());
     let options = rule.options(&mut read);
-    let scene = SelectiveScene::new(read, &options).map_err(|e| failed(&e))?;
+    let mut scene = SelectiveScene::new(read, &options).map_err(|e| failed(&e))?;
+    warnings.say(rule.apply(&mut scene, &file));
     if interrupt.is_set() {
         return Err(Failure::Interrupted);
     }
@@ -174,6 +175,7 @@ impl Args {
                 command: "extract",
                 to: results.format.extension(),
                 rule: name,
+                error: rule.error(),
                 tau: done.tau.is_finite().then_some(done.tau),
                 faces: done.faces(),
                 vertices: done.vertices(),
@@ -234,6 +236,7 @@ struct Report {
     command: &'static str,
     to: &'static str,
     rule: &'static str,
+    error: &'static str,
     tau: Option<f64>,
     faces: usize,
     vertices: usize,

@@ -135,7 +135,7 @@ impl Args {
             };
             let path = self.path.name().to_string();
             let mut report = Report::new(path, self.needs.tau, full_faces, frames, memory, seconds);
-            (report.rule, report.guard) = (name, guard);
+            (report.rule, report.error, report.guard) = (name, rule.error(), guard);
             Ok(report)
         })?;
         warnings.say(std::mem::take(&mut report.warnings));

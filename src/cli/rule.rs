@@ -1,11 +1,12 @@
-//! `--rule`: when a split may be made.
+//! `--rule`: when a split may be made; `--error`: how errors count.
 
 use super::Failure;
 use clap::ValueEnum;
 use progmesh::progressive::ProgressiveScene;
 use progmesh::refine::hierarchy::{Guarantee, Options, Rule};
+use progmesh::refine::selective::View;
 use progmesh::refine::truly::Guarded;
-use progmesh::selective::SelectiveScene;
+use progmesh::selective::{Deviation, SelectiveScene};
 use serde::Serialize;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -18,6 +19,14 @@ pub(crate) enum RuleName {
     Truly,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ErrorName {
+    /// By its length, whichever way it lies
+    Uniform,
+    /// What lies along the line of sight counts a quarter: fewer faces where a surface is seen from above
+    Directional,
+}
+
 /// Flags about the rule.
 #[derive(clap::Args, Debug)]
 pub(crate) struct RuleArgs {
@@ -27,6 +36,9 @@ pub(crate) struct RuleArgs {
     /// With --rule truly: do not hold faces from turning over
     #[arg(long, requires = "rule", help_heading = "View")]
     no_guard: bool,
+    /// How a deviation counts that is held against --tau
+    #[arg(long, value_enum, value_name = "HOW", default_value_t = ErrorName::Uniform, help_heading = "View")]
+    error: ErrorName,
 }
 
 /// What the flip guard did: a part of the schema of `--json`.
@@ -48,6 +60,13 @@ impl RuleArgs {
             Some(RuleName::Rings | RuleName::Cuts) if self.no_guard => {
                 wrong("--no-guard is for --rule truly")
             }
+            _ if !self.is_directional() => Ok(()),
+            Some(RuleName::Cuts | RuleName::Truly) => wrong(
+                "--error directional is for --rule rings: by the other rules it is not known which way deviations lie",
+            ),
+            None if memory => wrong(
+                "--memory and --error directional do not go together: what is read in parts has the rule of cuts, and does not know which way deviations lie",
+            ),
             _ => Ok(()),
         }
     }
@@ -61,6 +80,31 @@ impl RuleArgs {
         !self.no_guard
     }
 
+    fn is_directional(&self) -> bool {
+        self.error == ErrorName::Directional
+    }
+
+    /// How deviations count, and are measured.
+    pub(crate) fn deviation(&self) -> Deviation {
+        if self.is_directional() { Deviation::Directional } else { Deviation::Uniform }
+    }
+
+    /// The same, as reports call it.
+    pub(crate) fn error(&self) -> &'static str {
+        if self.is_directional() { "directional" } else { "uniform" }
+    }
+
+    /// Lets errors of the scene count as asked for; says so where they cannot.
+    pub(crate) fn apply(&self, scene: &mut SelectiveScene, file: &str) -> Option<String> {
+        scene.set_deviation(self.deviation());
+        let known = |v: &&View| v.hierarchy().all_bounds().has_directions();
+        let without = scene.views().iter().filter(|v| !known(v)).count();
+        (self.is_directional() && without > 0).then(|| {
+            let meshes = progmesh::pipeline::count(without, "mesh");
+            format!("{file}: the ring rule does not hold for {meshes}: errors there count whichever way they lie")
+        })
+    }
+
     /// How hierarchies are made. Bounds that meshes carry and that are for another rule than was asked for are dropped, so that they are measured.
     pub(crate) fn options(&self, scene: &mut ProgressiveScene) -> Options {
         let other = |g: Guarantee| match self.rule {
@@ -68,12 +112,14 @@ impl RuleArgs {
             Some(RuleName::Cuts) => g == Guarantee::Settled,
             Some(RuleName::Truly) | None => false,
         };
+        let directional = self.is_directional();
         for mesh in &mut scene.meshes {
-            if mesh.bounds.as_ref().is_some_and(|b| other(b.guarantee())) {
+            if mesh.bounds.as_ref().is_some_and(|b| other(b.guarantee()) || directional && !b.has_directions()) {
                 mesh.bounds = None;
             }
         }
-        if self.rule == Some(RuleName::Cuts) { Options::CUTS } else { Options::default() }
+        let options = if self.rule == Some(RuleName::Cuts) { Options::CUTS } else { Options::default() };
+        options.with_directions(directional)
     }
 
     /// The rule by which `scene` is refined, as reports call it: of several meshes the weakest.

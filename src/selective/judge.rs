@@ -1,6 +1,7 @@
 //! Measures what is shown, without the code that decides what to show.
 
-use super::SelectiveScene;
+use super::judge_directional::Spheres;
+use super::{Deviation, SelectiveScene};
 use crate::refine::view::Camera;
 use crate::simplify::measure::{MeasureError, Surface};
 use glam::DVec3;
@@ -10,6 +11,7 @@ use glam::DVec3;
 pub struct Judge {
     /// Places and normals, world space.
     samples: Vec<[DVec3; 2]>,
+    deviation: Deviation,
 }
 
 /// What a [`Judge`] found.
@@ -17,14 +19,14 @@ pub struct Judge {
 pub struct Judgement {
     /// Samples inside the frustum that face the camera.
     pub visible: usize,
-    /// The largest lambda * distance / depth among them, pixels; 0 if none is visible.
+    /// The largest lambda * deviation / depth among them, pixels; 0 if none is visible. The deviation is the distance from what is shown, or what of it counts ([`Judge::of`]).
     pub max_pixels: f64,
     /// The mean.
     pub mean_pixels: f64,
 }
 
 impl Judge {
-    /// `count` samples of the finest surface, the same every time: places of a sequence of low discrepancy, by area.
+    /// `count` samples of the finest surface, the same every time: places of a sequence of low discrepancy, by area. Deviations count as the scene lets them ([`SelectiveScene::set_deviation`]).
     ///
     /// Errors: a damaged mesh.
     pub fn new(scene: &SelectiveScene, count: usize) -> Result<Judge, super::SelectiveError> {
@@ -56,7 +58,13 @@ impl Judge {
             let (u, v) = (at(2).sqrt(), at(3));
             Some([t[0] * (1.0 - u) + t[1] * (u * (1.0 - v)) + t[2] * (u * v), normal(t)])
         };
-        Ok(Judge { samples: (0..count).filter_map(sample).collect() })
+        Ok(Judge { samples: (0..count).filter_map(sample).collect(), deviation: scene.deviation })
+    }
+
+    /// The same judge of deviations that count so. Of directional ones: of a sample p the least of `sqrt(across^2 + (along / 4)^2)` over all places q of what is shown, across and along being the parts of q - p
+    /// across and along the line of sight to p.
+    pub fn of(self, deviation: Deviation) -> Judge {
+        Judge { deviation, ..self }
     }
 
     /// Measures what `scene` shows, seen by `camera`. O(faces shown + samples log faces).
@@ -74,20 +82,30 @@ impl Judge {
         triangles: &[[DVec3; 3]],
         camera: &Camera,
     ) -> Result<Judgement, MeasureError> {
-        let points: Vec<[f64; 3]> = triangles.as_flattened().iter().map(|p| p.to_array()).collect();
-        let indices: Vec<[u32; 3]> =
-            (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-        let surface = Surface::new(&points[..], &indices)?;
-        let mut query = surface.query();
         let frustum = camera.frustum();
         let mut out = Judgement::default();
-        for &[p, normal] in &self.samples {
-            let line = if camera.is_perspective() { p - camera.eye() } else { camera.look() };
-            if line.dot(normal) < 0.0 && frustum.contains(p) {
-                let pixels = camera.pixels(query.distance(p), camera.depth(p));
-                out.visible += 1;
-                out.max_pixels = out.max_pixels.max(pixels);
-                out.mean_pixels += pixels;
+        let mut judge = |deviation: &mut dyn FnMut(DVec3, DVec3) -> f64| {
+            for &[p, normal] in &self.samples {
+                let line = if camera.is_perspective() { p - camera.eye() } else { camera.look() };
+                if line.dot(normal) < 0.0 && frustum.contains(p) {
+                    let pixels = camera.pixels(deviation(p, line), camera.depth(p));
+                    out.visible += 1;
+                    out.max_pixels = out.max_pixels.max(pixels);
+                    out.mean_pixels += pixels;
+                }
+            }
+        };
+        match self.deviation {
+            Deviation::Uniform => {
+                let points: Vec<[f64; 3]> = triangles.as_flattened().iter().map(|p| p.to_array()).collect();
+                let corners = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
+                let surface = Surface::new(&points[..], &corners.collect::<Vec<[u32; 3]>>())?;
+                let mut query = surface.query();
+                judge(&mut |p, _| query.distance(p));
+            }
+            Deviation::Directional => {
+                let spheres = Spheres::new(triangles)?;
+                judge(&mut |p, line| spheres.least(p, line));
             }
         }
         out.mean_pixels /= out.visible.max(1) as f64;

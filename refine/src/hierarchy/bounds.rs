@@ -1,6 +1,7 @@
 //! Bounds of splits, packed into eight bytes.
 
 use super::cone::Cone;
+use super::directions::{self, Body, Direction};
 use super::spheres::Extent;
 use crate::progressive::{Damage, ProgressiveMesh};
 use crate::view::NormalCone;
@@ -50,7 +51,7 @@ impl Guarantee {
     }
 }
 
-/// Bounds of all splits of a progressive mesh, or of a run of them; 8 B a split.
+/// Bounds of all splits of a progressive mesh, or of a run of them; 8 B a split, 10 with directions.
 ///
 /// They belong to the splits, not to their order: [`ProgressiveMesh::reordered`] takes those that a mesh carries ([`ProgressiveMesh::bounds`]) along. Errors and radii are
 /// rounded up, by at most 1 in 256, cones are widened by at most 0.3 degrees.
@@ -64,6 +65,8 @@ pub struct Bounds {
     /// Of settled bounds: splits with a lower turn come before those with a higher one, so that the order they were measured in comes back from any other. Empty for others, and
     /// in hierarchies.
     pub(crate) turns: Vec<u32>,
+    /// Which way deviations lie; empty if that is not known.
+    pub(crate) directions: Vec<Direction>,
 }
 
 /// The bounds of a split as they are kept.
@@ -184,6 +187,16 @@ impl Bounds {
         }
     }
 
+    /// Keeps which way deviations lie, raised to nest; errors are set.
+    pub(super) fn set_directions(&mut self, forest: &super::Forest, bodies: Vec<Body>) {
+        self.directions = directions::nested(forest, bodies, |i| unpack(self.of[i].error) as f64);
+    }
+
+    /// Which way deviations lie is known, so that views can take directional errors ([`crate::selective::Lens::directional`]).
+    pub fn has_directions(&self) -> bool {
+        !self.directions.is_empty() || self.of.is_empty()
+    }
+
     /// Splits.
     pub fn len(&self) -> usize {
         self.of.len()
@@ -222,13 +235,18 @@ impl Bounds {
     /// Those of the splits in a range, which are numbered from 0 then. Panics if there are no such splits.
     pub fn slice(&self, range: std::ops::Range<usize>) -> Bounds {
         let turns = if self.turns.is_empty() { Vec::new() } else { self.turns[range.clone()].to_vec() };
-        Bounds { of: self.of[range].to_vec(), turns, ..self.without_splits() }
+        let known = !self.directions.is_empty();
+        let directions = if known { self.directions[range.clone()].to_vec() } else { Vec::new() };
+        Bounds { of: self.of[range].to_vec(), turns, directions, ..self.without_splits() }
     }
 
     /// Appends the bounds of the splits that follow; false (and nothing done) if they are of another mesh.
     pub fn append(&mut self, next: &Bounds) -> bool {
-        let same = self.without_splits() == next.without_splits();
+        let known = |b: &Bounds| b.directions.len() == b.of.len();
+        let same = self.without_splits() == next.without_splits()
+            && (self.is_empty() || next.is_empty() || known(self) == known(next));
         if same {
+            self.directions.extend_from_slice(&next.directions);
             self.of.extend_from_slice(&next.of);
             self.turns.extend_from_slice(&next.turns);
         }
@@ -237,14 +255,15 @@ impl Bounds {
 
     fn without_splits(&self) -> Bounds {
         let (origin, diagonal, guarantee) = (self.origin, self.diagonal, self.guarantee);
-        Bounds { origin, diagonal, guarantee, of: Vec::new(), turns: Vec::new() }
+        Bounds { origin, diagonal, guarantee, ..Bounds::default() }
     }
 
     /// Those of the same mesh with split `order[k]` as the `k`-th; `None` if there is no such split.
     pub fn reordered(&self, order: &[u32]) -> Option<Bounds> {
         let of = order.iter().map(|&i| self.of.get(i as usize).copied()).collect::<Option<_>>()?;
         let turns = order.iter().filter_map(|&i| self.turns.get(i as usize).copied()).collect();
-        Some(Bounds { of, turns, ..self.without_splits() })
+        let directions = order.iter().filter_map(|&i| self.directions.get(i as usize).copied()).collect();
+        Some(Bounds { of, turns, directions, ..self.without_splits() })
     }
 
     /// For a mesh of which every vertex has moved by at most `by`: errors grow by twice that, as both meshes have moved, and spheres and cones are found anew.
@@ -258,6 +277,10 @@ impl Bounds {
         let extents = if settled { (0..self.len()).map(widened).collect() } else { Vec::new() };
         let mut moved = Bounds::of_errors(mesh, &errors, self.guarantee, &extents)?;
         moved.turns = self.turns.clone();
+        if !self.directions.is_empty() {
+            let body = |i: usize| Body::stored(self.error(i), self.directions[i]).grown(2.0 * by);
+            moved.set_directions(&super::Forest::new(mesh), (0..self.len()).map(body).collect());
+        }
         Ok(moved)
     }
 
@@ -281,12 +304,19 @@ impl Bounds {
         if self.len() != forest.len() {
             return Err(Damage::Length { what: "bounds", len: self.len(), want: forest.len() });
         }
+        if !self.directions.is_empty() && self.directions.len() != self.len() {
+            return Err(Damage::Length { what: "directions", len: self.directions.len(), want: self.len() });
+        }
         let centre = |i: usize| self.place_before(mesh, forest, i as u32).as_dvec3();
         let ups = forest.ups();
         for (i, up) in ups.iter().map(|&up| up as usize).enumerate() {
             if let Some(above) = self.of.get(up) {
                 let reach = centre(i).distance(centre(up)) + self.radius(i);
-                if self.of[i].error > above.error || reach > self.radius(up) {
+                let turned = !self.directions.is_empty() && !{
+                    let body = |k: usize| Body::stored(self.error(k), self.directions[k]);
+                    body(up).holds(&body(i))
+                };
+                if self.of[i].error > above.error || reach > self.radius(up) || turned {
                     return Err(Damage::Bounds(i));
                 }
             }
@@ -296,7 +326,7 @@ impl Bounds {
 
     /// Bytes of those of all splits.
     pub fn bytes(&self) -> usize {
-        size_of::<Packed>() * self.of.len() + 4 * self.turns.len()
+        size_of::<Packed>() * self.of.len() + 4 * self.turns.len() + 2 * self.directions.len()
     }
 }
 

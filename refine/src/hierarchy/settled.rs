@@ -6,6 +6,7 @@
 
 use super::bounds::Bounds;
 use super::deviation::keep_farthest;
+use super::directions::Body;
 use super::forest::Forest;
 use super::spheres::{self, Extent};
 use super::{Finest, Options};
@@ -81,6 +82,7 @@ struct Walk<'a> {
     effort: Effort,
     loose: Vec<u32>,
     star: Vec<u32>,
+    ways: Vec<DVec3>,
 }
 
 /// The finest faces around every vertex.
@@ -116,10 +118,15 @@ impl Around {
 /// The bounds of all splits. `front` is at full detail, and the order of the splits that of the rule. O(n log n) for meshes whose hierarchy is as deep.
 pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: Front, options: &Options) -> Bounds {
     let finest = Finest::new(pm, forest, &front);
-    let (errors, extents) = walk(pm, forest, front, &finest, (Effort::Full, options.samples));
+    let mut bodies = options.directions.then(|| vec![Body::default(); forest.len()]);
+    let effort = (Effort::Full, options.samples);
+    let (errors, extents) = walk(pm, forest, front, &finest, effort, bodies.as_deref_mut());
     let mut bounds = spheres::around(pm, forest, &finest, &extents);
     let margin = options.margin.max(1.0);
     bounds.set_errors(forest, errors.into_iter().map(|e| e * margin).collect());
+    if let Some(bodies) = bodies {
+        bounds.set_directions(forest, bodies.into_iter().map(|b| b.scaled(margin)).collect());
+    }
     bounds
 }
 
@@ -132,22 +139,24 @@ pub(super) fn estimate(
 ) -> (Vec<f64>, f64) {
     let finest = Finest::new(pm, forest, &front);
     let effort = (Effort::Vertices, options.samples.min(FEW));
-    (walk(pm, forest, front, &finest, effort).0, finest.diagonal)
+    (walk(pm, forest, front, &finest, effort, None).0, finest.diagonal)
 }
 
-/// For every split the largest distance that undoing it leads to, and how far the samples reach that it moves.
+/// For every split the largest distance that undoing it leads to, and how far the samples reach that it moves; if asked for, bodies of the ways from samples to where they are put.
 fn walk(
     pm: &ProgressiveMesh,
     forest: &Forest,
     front: Front,
     finest: &Finest,
     effort: (Effort, usize),
+    mut bodies: Option<&mut [Body]>,
 ) -> (Vec<f64>, Vec<Extent>) {
     let mut walk = Walk::new(pm, forest, front, finest, effort);
     let mut errors = vec![0.0; forest.len()];
     let mut extents = vec![Extent::default(); forest.len()];
     for i in (0..forest.len() as u32).rev() {
-        errors[i as usize] = walk.undo(i, &mut extents[i as usize]);
+        let body = bodies.as_deref_mut().map(|b| &mut b[i as usize]);
+        errors[i as usize] = walk.undo(i, &mut extents[i as usize], body);
     }
     (errors, extents)
 }
@@ -206,11 +215,12 @@ impl<'a> Walk<'a> {
             front,
             loose: Vec::new(),
             star: Vec::new(),
+            ways: Vec::new(),
         }
     }
 
     /// Undoes a split; returns the largest distance of a sample that it moves.
-    fn undo(&mut self, i: u32, extent: &mut Extent) -> f64 {
+    fn undo(&mut self, i: u32, extent: &mut Extent, body: Option<&mut Body>) -> f64 {
         let k = i as usize;
         let vs = self.pm.splits.vertex[k] as usize;
         let mut star = std::mem::take(&mut self.star);
@@ -243,6 +253,8 @@ impl<'a> Walk<'a> {
         let triangles: Vec<Reach> =
             star.iter().map(|&s| Reach::of(self.front.corners()[s as usize].map(at))).collect();
         let mut error = 0.0f64;
+        let mut ways = std::mem::take(&mut self.ways);
+        ways.clear();
         for &s in &loose {
             let sample = &mut self.samples[s as usize];
             let (d, on) = nearest(sample.at, &triangles);
@@ -251,6 +263,11 @@ impl<'a> Walk<'a> {
             sample.distance = d as f32;
             error = error.max(d);
             if d > 0.0 {
+                if body.is_some() {
+                    let t = triangles[on].corners;
+                    let w = closest_on_triangle(t, sample.at).0;
+                    ways.push(t[0] * w[0] + t[1] * w[1] + t[2] * w[2] - sample.at);
+                }
                 extent.reach(own.distance(sample.at));
                 match (sample.kind, sample.of) {
                     (Kind::Vertex, [v, _]) => self.cones[v as usize].iter().for_each(|c| extent.turn(c)),
@@ -258,7 +275,11 @@ impl<'a> Walk<'a> {
                 }
             }
         }
-        (self.star, self.loose) = (star, loose);
+        if let Some(body) = body {
+            let normal = |t: &Reach| (t.corners[1] - t.corners[0]).cross(t.corners[2] - t.corners[0]);
+            *body = Body::around(&ways, triangles.iter().map(normal).sum());
+        }
+        (self.star, self.loose, self.ways) = (star, loose, ways);
         error
     }
 

@@ -13,6 +13,7 @@
 use super::Lens;
 use super::entry::Entry;
 use super::lens::turned;
+use crate::hierarchy::CHANGE;
 
 /// Whether a split is needed, and how far lenses may move before that can change.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +87,7 @@ impl Pace {
     fn motion(&self, (a, at): (&Lens, f64), (b, bt): (&Lens, f64)) -> Option<f64> {
         let same = a.frustum.is_some() == b.frustum.is_some()
             && (a.back, a.perspective, a.near, a.slant) == (b.back, b.perspective, b.near, b.slant)
+            && a.directional == b.directional
             && (a.steep - b.steep).abs() <= 1e-12 * a.steep;
         if !same {
             return None;
@@ -205,9 +207,17 @@ impl Lens {
             if tau == f64::INFINITY {
                 return Verdict { wanted: false, slack };
             }
-            let fine = self.lambda * e.error as f64 / tau;
+            let all = self.lambda * e.error as f64 / tau;
+            let fine = all * self.counts(e, line, radius);
             // By e^x - 1 <= 1.3 x for what the clock reaches, 0.25.
-            let grows = if pace.per_tau.is_finite() { 1.3 * fine / pace.per_tau } else { 0.0 };
+            let grows = if pace.per_tau.is_finite() { 1.3 * all / pace.per_tau } else { 0.0 };
+            let (grows, until) = match self.directional {
+                true => {
+                    let (turns, until) = self.turns(line, radius, pace);
+                    (grows + all * CHANGE * turns, until)
+                }
+                false => (grows, f64::INFINITY),
+            };
             if self.perspective {
                 let along = self.gradient.dot(line) - self.steep * radius;
                 let about = self.slant * (away - radius);
@@ -219,10 +229,10 @@ impl Lens {
                 };
                 if depths.iter().any(|&d| d > fine) {
                     let slack = (0..3).filter(|&k| depths[k] > fine).map(above).fold(0.0, f64::max);
-                    return Verdict { wanted: false, slack };
+                    return Verdict { wanted: false, slack: slack.min(until) };
                 }
                 let below = (0..3).map(|k| -above(k)).filter(|s| !s.is_nan());
-                slack = below.fold(slack, f64::min);
+                slack = below.fold(slack, f64::min).min(until);
             } else {
                 let by = if grows > 0.0 { (1.0 - fine).abs() / grows } else { f64::INFINITY };
                 if 1.0 > fine {
@@ -260,6 +270,23 @@ impl Lens {
             }
         }
         if unseen { Verdict { wanted: false, slack: slack_unseen } } else { Verdict { wanted: true, slack } }
+    }
+
+    /// How fast, by the clock, the angle between an axis and the farthest line of sight to a sphere changes, at most, and for how much of the clock that holds.
+    fn turns(&self, line: glam::DVec3, radius: f64, pace: &Pace) -> (f64, f64) {
+        if !self.perspective {
+            // An angle is at most pi / 2 of its chord.
+            return (std::f64::consts::FRAC_PI_2 / pace.reach(), f64::INFINITY);
+        }
+        // At a distance l the middle's line turns by 1 / l of the eye's way, and the half angle of the sphere, asin(r / l), changes by r / (l sqrt(l^2 - r^2)) of it, across the other: together by 1 / sqrt(l^2 - r^2). While
+        // the eye comes no nearer than half way to the sphere, l^2 - r^2 is a quarter of (l - r) (l + 3 r) at least.
+        let (l, r) = (line.length(), radius);
+        if l > r {
+            let turns = 2.0 / ((l - r) * (l + 3.0 * r)).sqrt();
+            return (turns / EYE, 0.5 * (l - r) * EYE);
+        }
+        // In the sphere all counts.
+        (0.0, (r - l) * EYE)
     }
 
     /// How far the line of sight may move before a cone turns its back that looks the other way now, or all ways.
@@ -330,7 +357,7 @@ impl<'a> Judges<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hierarchy::{Cone, Packed};
+    use crate::hierarchy::{Cone, Direction, Packed};
     use crate::selective::Cull;
     use crate::view::{Camera, CameraParameters, NormalCone, Projection};
     use glam::{DMat4, DVec3};
@@ -356,6 +383,7 @@ mod tests {
         look: DVec3,
         up: DVec3,
         tau: f64,
+        directional: bool,
     }
 
     impl Pose {
@@ -376,7 +404,8 @@ mod tests {
                 far: 20.0,
             });
             let placed = DMat4::from_scale(DVec3::splat(1.7));
-            Lens::about(DVec3::ZERO, &c.unwrap(), &placed, self.tau, cull).unwrap()
+            let lens = Lens::about(DVec3::ZERO, &c.unwrap(), &placed, self.tau, cull).unwrap();
+            if self.directional { lens.directional() } else { lens }
         }
 
         fn moved(&self, r: &mut Random, step: f64) -> Pose {
@@ -389,7 +418,7 @@ mod tests {
                 _ => (self.eye + step * r.vector(), turn * self.look, turn * self.up),
             };
             let tau = if r.unit() < 0.5 { self.tau } else { self.tau * (step * (r.unit() - 0.5)).exp() };
-            Pose { eye, look, up, tau }
+            Pose { eye, look, up, tau, directional: self.directional }
         }
     }
 
@@ -399,23 +428,21 @@ mod tests {
         let error = radius * 0.2 * r.unit().powi(3);
         let pack = crate::hierarchy::pack_up;
         // Some lie a little outside of the box of the finest mesh.
-        Entry::new(
-            0,
-            (0.6 * DIAGONAL * r.vector()).as_vec3(),
-            Packed { error: pack(error), radius: pack(radius), cone: Cone::around(&cone) },
-        )
+        let packed = Packed { error: pack(error), radius: pack(radius), cone: Cone::around(&cone) };
+        let direction = Direction((r.unit() * 65536.0) as u16);
+        Entry { direction, ..Entry::new(0, (0.6 * DIAGONAL * r.vector()).as_vec3(), packed) }
     }
 
     #[test]
     fn what_was_decided_stands_for_as_long_as_the_slack_says() {
         let mut r = Random(5);
         let (mut stood, mut fell, mut wanted) = (0, 0, 0);
-        for round in 0..300 {
-            let perspective = round % 5 != 0;
+        for round in 0..600 {
+            let (perspective, directional) = (round % 5 != 0, round >= 300);
             let cull = [Cull::All, Cull::None, Cull::Frustum, Cull::Cone][round % 4];
             let eye = r.vector() * [0.4, 1.0, 3.0][round % 3];
             let look = if r.unit() < 0.7 { 0.3 * r.vector() - eye } else { r.vector() };
-            let start = Pose { eye, look, up: r.vector(), tau: 0.2 + 2.0 * r.unit() };
+            let start = Pose { eye, look, up: r.vector(), tau: 0.2 + 2.0 * r.unit(), directional };
             let first = start.lens(perspective, cull);
             let pace = Pace::of(&first, DIAGONAL / 1.7, DIAGONAL / 1.7);
             let entries: Vec<Entry> = (0..60).map(|_| entry(&mut r)).collect();
@@ -445,7 +472,7 @@ mod tests {
                 last = lens;
             }
         }
-        assert!(stood > 20_000 && fell > 200 && wanted > 2000, "{stood} {fell} {wanted}");
+        assert!(stood > 40_000 && fell > 400 && wanted > 4000, "{stood} {fell} {wanted}");
     }
 
     #[test]
@@ -469,7 +496,7 @@ mod tests {
     #[test]
     fn small_moves_take_few_steps_and_other_cameras_begin_anew() {
         let mut clock = Clock::new(DIAGONAL);
-        let mut pose = Pose { eye: DVec3::Z * 3.0, look: -DVec3::Z, up: DVec3::Y, tau: 1.0 };
+        let mut pose = Pose { eye: DVec3::Z * 3.0, look: -DVec3::Z, up: DVec3::Y, tau: 1.0, directional: false };
         let all = Cull::All;
         assert!(!clock.go_on(&Judges::new(&[pose.lens(true, all)], 1.0)));
         assert!(clock.go_on(&Judges::new(&[pose.lens(true, all)], 1.0)) && clock.now() == 0);

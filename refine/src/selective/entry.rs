@@ -1,9 +1,9 @@
 //! A split with what is needed to decide about it.
 
-use crate::hierarchy::{Cone, Hierarchy, Packed, unpack};
+use crate::hierarchy::{Cone, Direction, Hierarchy, Packed, unpack};
 use glam::Vec3;
 
-/// A split and its bounds, ready to be decided about, 28 B.
+/// A split and its bounds, ready to be decided about, 32 B.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {
     pub(super) centre: Vec3,
@@ -11,11 +11,12 @@ pub(crate) struct Entry {
     pub(super) error: f32,
     pub(crate) split: u32,
     pub(super) cone: Cone,
+    pub(super) direction: Direction,
 }
 
 impl Entry {
-    pub(super) fn of(h: &Hierarchy, i: u32) -> Entry {
-        Entry::new(i, h.local_centre(i), h.bounds.of[i as usize])
+    pub(crate) fn of(h: &Hierarchy, i: u32) -> Entry {
+        Entry::new(i, h.local_centre(i), h.bounds.of[i as usize]).with_direction(h)
     }
 
     /// Of the split of vertex `v` that comes after the first `k` of its chain, and is `i`.
@@ -27,12 +28,19 @@ impl Entry {
     /// Of split `i`, of a vertex that stands there.
     #[inline]
     pub(super) fn at(h: &Hierarchy, i: u32, place: glam::DVec3) -> Entry {
-        Entry::new(i, h.bounds.local(place), h.bounds.of[i as usize])
+        Entry::new(i, h.bounds.local(place), h.bounds.of[i as usize]).with_direction(h)
     }
 
     /// Of a split at `centre`, about the origin of the bounds.
     #[inline]
     pub(crate) fn new(split: u32, centre: Vec3, b: Packed) -> Entry {
-        Entry { centre, radius: unpack(b.radius), error: unpack(b.error), split, cone: b.cone }
+        let direction = Direction::ANY;
+        Entry { centre, radius: unpack(b.radius), error: unpack(b.error), split, cone: b.cone, direction }
+    }
+
+    #[inline]
+    fn with_direction(mut self, h: &Hierarchy) -> Entry {
+        self.direction = h.direction(self.split);
+        self
     }
 }

@@ -1,7 +1,7 @@
 //! What a view needs: which splits may be seen, and how large their errors may look.
 
 use super::entry::Entry;
-use crate::hierarchy::{Hierarchy, SplitBounds};
+use crate::hierarchy::{DEPTH, Hierarchy, SplitBounds};
 use crate::view::{Camera, Frustum, Planes};
 use glam::{DMat3, DMat4, DVec3};
 
@@ -51,6 +51,10 @@ pub struct Lens {
     /// Of what is in the picture, depth is at least this times the distance from the eye, lengths of the mesh.
     pub(super) slant: f64,
     pub(super) perspective: bool,
+    /// Errors count by where they lie to the line of sight.
+    pub(super) directional: bool,
+    /// The mesh is placed without changing its angles.
+    similar: bool,
 }
 
 impl Lens {
@@ -106,7 +110,18 @@ impl Lens {
             near: camera.near().max(0.0),
             slant: least / (1.0 + corner * corner).sqrt(),
             perspective: camera.is_perspective(),
+            directional: false,
+            similar: most <= least * (1.0 + 1e-6),
         })
+    }
+
+    /// The same with *directional* errors: what deviates along the line of sight counts a quarter, as it hardly shows. Where the finest mesh has a place p, what is shown has a place q near it such that lambda /
+    /// depth times `sqrt(across^2 + (along / 4)^2)`, of the parts of q - p across and along the line of sight to p, is no more than the tolerance; so |q - p| is at most four times as much. Fewer faces, where the
+    /// surface is seen from above; outlines stay as they are.
+    ///
+    /// It takes bounds that know directions ([`crate::hierarchy::Options::directions`]); by others errors count as they did. So they do where the mesh is placed by a matrix that changes angles.
+    pub fn directional(self) -> Lens {
+        Lens { directional: self.similar, ..self }
     }
 
     /// The tolerance, pixels.
@@ -123,7 +138,7 @@ impl Lens {
         Ok(self)
     }
 
-    /// How many pixels the error of a split may take up, at most, wherever in its sphere it is; a bound that never grows from a split to those below.
+    /// How many pixels the error of a split may take up, at most, wherever in its sphere and whichever way it is; a bound that never grows from a split to those below.
     pub fn pixels(&self, hierarchy: &Hierarchy, b: &SplitBounds) -> f64 {
         let centre = b.centre - hierarchy.bounds.origin;
         self.lambda * b.error / self.depth(centre, b.radius, f64::INFINITY)
@@ -158,11 +173,29 @@ impl Lens {
         // Depth beyond which it is fine enough; 0 / 0 is not.
         if tau > 0.0 {
             let fine = size / tau;
-            if self.depth(centre, radius, fine) > fine || tau == f64::INFINITY {
+            let depth = self.depth(centre, radius, fine);
+            if depth > fine || tau == f64::INFINITY {
+                return false;
+            }
+            if self.directional && depth > DEPTH * fine && depth > fine * self.counts(e, centre - self.eye, radius) {
                 return false;
             }
         }
         self.sees(e, centre, radius)
+    }
+
+    /// What part of the error counts, seen anywhere in the sphere; `line` leads to its middle.
+    #[inline]
+    pub(super) fn counts(&self, e: &Entry, line: DVec3, radius: f64) -> f64 {
+        if !self.directional {
+            return 1.0;
+        }
+        if !self.perspective {
+            return e.direction.counts(self.look, (0.0, 1.0));
+        }
+        let wide = radius * radius / line.length_squared();
+        // Not the comparison turned round: 0 / 0 is all ways.
+        if wide < 1.0 { e.direction.counts(line, (wide.sqrt(), (1.0 - wide).sqrt())) } else { 1.0 }
     }
 
     /// How many tolerances the error may take up, at most; 0 if it is not seen.
@@ -172,7 +205,8 @@ impl Lens {
         if !self.sees(e, centre, radius) {
             return 0.0;
         }
-        self.lambda * e.error as f64 / (self.depth(centre, radius, f64::INFINITY) * self.tau)
+        let size = self.lambda * e.error as f64 * self.counts(e, centre - self.eye, radius);
+        size / (self.depth(centre, radius, f64::INFINITY) * self.tau)
     }
 
     /// It may be seen.

@@ -39,6 +39,7 @@ impl Args {
                 command: "extract",
                 to: results.format.extension(),
                 rule: "cuts",
+                error: "uniform",
                 tau: tau.is_finite().then_some(tau),
                 faces: scene.face_count(),
                 vertices: scene.vertex_count(),
