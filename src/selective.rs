@@ -109,7 +109,14 @@ impl SelectiveScene {
         let views = each.collect::<Result<_, _>>()?;
         let morphs = Morphs::default();
         let deviation = Deviation::default();
-        Ok(SelectiveScene { views, places, shell: scene.shell, leftovers: scene.leftovers, morphs, deviation })
+        Ok(SelectiveScene {
+            views,
+            places,
+            shell: scene.shell,
+            leftovers: scene.leftovers,
+            morphs,
+            deviation,
+        })
     }
 
     /// The views, one a mesh: what the last frame asked for.

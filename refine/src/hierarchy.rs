@@ -68,10 +68,12 @@ pub struct Options {
 impl Options {
     /// By the ring rule. At a margin of 1 ten views each at tolerances of 0.3, 1 and 4 pixels showed up to 1.19 of it with 100 samples (horse, the textured bunny), up to 1.33 with 60
     /// (also fandisk, igea and bunny), up to 1.67 with 12 (horse). `docs/selective.md` has what was measured with these values.
-    pub const RINGS: Options = Options { rule: Rule::Rings, margin: 1.35, rounds: 1, samples: 100, directions: false };
+    pub const RINGS: Options =
+        Options { rule: Rule::Rings, margin: 1.35, rounds: 1, samples: 100, directions: false };
     /// By the rule of cuts. At a margin of 1 with two rounds views of five sample meshes (`tests/selective.rs`) showed up to 1.4 of the tolerance, of dragon, igea, horse and the
     /// textured bunny up to 2.0 (their medians about 1.2); without rounds more.
-    pub const CUTS: Options = Options { rule: Rule::Cuts, margin: 2.25, rounds: 2, samples: 12, directions: false };
+    pub const CUTS: Options =
+        Options { rule: Rule::Cuts, margin: 2.25, rounds: 2, samples: 12, directions: false };
 
     /// Sets [`Options::margin`].
     pub fn with_margin(mut self, margin: f64) -> Self {

@@ -101,7 +101,9 @@ impl RuleArgs {
         let without = scene.views().iter().filter(|v| !known(v)).count();
         (self.is_directional() && without > 0).then(|| {
             let meshes = progmesh::pipeline::count(without, "mesh");
-            format!("{file}: the ring rule does not hold for {meshes}: errors there count whichever way they lie")
+            format!(
+                "{file}: the ring rule does not hold for {meshes}: errors there count whichever way they lie"
+            )
         })
     }
 
@@ -114,7 +116,11 @@ impl RuleArgs {
         };
         let directional = self.is_directional();
         for mesh in &mut scene.meshes {
-            if mesh.bounds.as_ref().is_some_and(|b| other(b.guarantee()) || directional && !b.has_directions()) {
+            if mesh
+                .bounds
+                .as_ref()
+                .is_some_and(|b| other(b.guarantee()) || directional && !b.has_directions())
+            {
                 mesh.bounds = None;
             }
         }

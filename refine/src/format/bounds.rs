@@ -99,7 +99,7 @@ pub(super) fn read(bytes: &[u8], count: usize, raw: u64) -> Option<Bounds> {
             return None;
         }
     }
-    Some(Bounds { origin, diagonal, guarantee, of, turns })
+    Some(Bounds { origin, diagonal, guarantee, of, turns, directions: Vec::new() })
 }
 
 #[cfg(test)]
@@ -117,6 +117,7 @@ mod tests {
         ) {
             let packed = |&(error, radius, cone): &(u16, u16, u32)| Packed { error, radius, cone: Cone(cone) };
             let bounds = Bounds {
+                directions: Vec::new(),
                 origin: DVec3::from_array(origin),
                 diagonal: 7.5,
                 guarantee: Guarantee::from_code(code).unwrap(),

@@ -312,10 +312,11 @@ impl Bounds {
         for (i, up) in ups.iter().map(|&up| up as usize).enumerate() {
             if let Some(above) = self.of.get(up) {
                 let reach = centre(i).distance(centre(up)) + self.radius(i);
-                let turned = !self.directions.is_empty() && !{
-                    let body = |k: usize| Body::stored(self.error(k), self.directions[k]);
-                    body(up).holds(&body(i))
-                };
+                let turned = !self.directions.is_empty()
+                    && !{
+                        let body = |k: usize| Body::stored(self.error(k), self.directions[k]);
+                        body(up).holds(&body(i))
+                    };
                 if self.of[i].error > above.error || reach > self.radius(up) || turned {
                     return Err(Damage::Bounds(i));
                 }

@@ -496,7 +496,8 @@ mod tests {
     #[test]
     fn small_moves_take_few_steps_and_other_cameras_begin_anew() {
         let mut clock = Clock::new(DIAGONAL);
-        let mut pose = Pose { eye: DVec3::Z * 3.0, look: -DVec3::Z, up: DVec3::Y, tau: 1.0, directional: false };
+        let mut pose =
+            Pose { eye: DVec3::Z * 3.0, look: -DVec3::Z, up: DVec3::Y, tau: 1.0, directional: false };
         let all = Cull::All;
         assert!(!clock.go_on(&Judges::new(&[pose.lens(true, all)], 1.0)));
         assert!(clock.go_on(&Judges::new(&[pose.lens(true, all)], 1.0)) && clock.now() == 0);

@@ -177,7 +177,10 @@ impl Lens {
             if depth > fine || tau == f64::INFINITY {
                 return false;
             }
-            if self.directional && depth > DEPTH * fine && depth > fine * self.counts(e, centre - self.eye, radius) {
+            if self.directional
+                && depth > DEPTH * fine
+                && depth > fine * self.counts(e, centre - self.eye, radius)
+            {
                 return false;
             }
         }

@@ -204,6 +204,7 @@ impl Path<'_> {
             chunk.error = errors.iter().map(|&e| rounded_error(e)).fold(0.0, f32::max);
             let own = &open.packed[at - open.splits..at - open.splits + count];
             let bounds = Bounds {
+                directions: Vec::new(),
                 origin: self.tree.about.0,
                 diagonal: self.tree.about.1,
                 guarantee: self.tree.guarantee,
