@@ -48,16 +48,8 @@ impl TrulyView {
         {
             self.apply_with_all(i, guard, &mut meter, &mut Vec::new());
         }
-        // A collapse that was deferred may do when others are made.
-        loop {
-            let before = meter.done.collapses;
-            self.guarded.deferred = 0;
-            if !meter.over {
-                self.coarsen(lenses, guard, &mut meter);
-            }
-            if meter.over || meter.done.collapses == before || self.guarded.deferred == 0 {
-                break;
-            }
+        if !meter.over {
+            self.coarsen(lenses, guard, &mut meter);
         }
         if !meter.over {
             self.refine(lenses, guard, &mut meter);
@@ -66,35 +58,64 @@ impl TrulyView {
         meter.done
     }
 
-    /// Undoes splits that are not needed, once through all that could be.
+    /// Undoes splits that are not needed, until none is left that could be. Looks once at all that could be undone, and as they come at those that can be then; after that only at those that the guard held
+    /// back, for as long as one of them goes: each collapse may be what another has waited for.
     fn coarsen(&mut self, lenses: &[Lens], guard: bool, meter: &mut Meter<'_>) {
-        let keep = meter.limits.hysteresis.clamp(1e-6, 1.0);
-        let mut stack = Vec::new();
+        let (mut stack, mut waiting) = (Vec::new(), Vec::new());
         let mut at = self.last.0.len();
         while at > 0 && meter.goes_on() {
             // Downwards: what comes in is put at the end, and looked at as it does.
             at = (at - 1).min(self.last.0.len().saturating_sub(1));
             let Some(e) = self.last.0.get(at) else { break };
             stack.push(e.split);
-            while let Some(i) = stack.pop() {
-                // It may have come in twice.
-                let Some(e) = self.last.get(i, &self.place) else { continue };
-                meter.looks += 1;
-                if wants(lenses, e, keep) {
-                    continue;
-                }
-                if !meter.goes_on() {
-                    break;
-                }
-                if guard && !guard::collapse_is_good(&self.mesh, &self.hierarchy, &self.pieces, i) {
-                    self.guarded.deferred += 1;
-                    continue;
-                }
-                self.undo(i);
-                meter.done.collapses += 1;
-                meter.since += 1;
-                stack.extend(self.needs(i));
+            self.undo_from(&mut stack, &mut waiting, lenses, guard, meter);
+        }
+        while !waiting.is_empty() && !meter.over {
+            let before = meter.done.collapses;
+            waiting.sort_unstable();
+            waiting.dedup();
+            for i in std::mem::take(&mut waiting).into_iter().rev() {
+                stack.push(i);
+                self.undo_from(&mut stack, &mut waiting, lenses, guard, meter);
             }
+            if meter.done.collapses == before {
+                break;
+            }
+        }
+        waiting.sort_unstable();
+        waiting.dedup();
+        self.guarded.deferred = waiting.iter().filter(|&&i| self.last.get(i, &self.place).is_some()).count();
+    }
+
+    /// Undoes the splits on the stack that are not needed, and what can be undone then; those that the guard holds back wait.
+    fn undo_from(
+        &mut self,
+        stack: &mut Vec<u32>,
+        waiting: &mut Vec<u32>,
+        lenses: &[Lens],
+        guard: bool,
+        meter: &mut Meter<'_>,
+    ) {
+        let keep = meter.limits.hysteresis.clamp(1e-6, 1.0);
+        while let Some(i) = stack.pop() {
+            // It may have come in twice.
+            let Some(e) = self.last.get(i, &self.place) else { continue };
+            meter.looks += 1;
+            if wants(lenses, e, keep) {
+                continue;
+            }
+            if !meter.goes_on() {
+                stack.clear();
+                return;
+            }
+            if guard && !guard::collapse_is_good(&self.mesh, &self.hierarchy, &self.pieces, i) {
+                waiting.push(i);
+                continue;
+            }
+            self.undo(i);
+            meter.done.collapses += 1;
+            meter.since += 1;
+            stack.extend(self.needs(i));
         }
     }
 
