@@ -251,15 +251,16 @@ struct Report {
     warnings: Vec<String>,
 }
 
-#[derive(Clone, Copy, Serialize)]
-struct StripReport {
+/// Triangle strips: a part of the schema of `--json`.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct StripReport {
     count: usize,
-    mean_length: f64,
+    pub(crate) mean_length: f64,
 }
 
 impl StripReport {
     /// Of the meshes' strips together.
-    fn of(all: impl Iterator<Item = Strips>) -> StripReport {
+    pub(crate) fn of(all: impl Iterator<Item = Strips>) -> StripReport {
         let sum = |(n, t): (usize, usize), s: Strips| (n + s.len(), t + s.triangles());
         let (count, triangles) = all.fold((0, 0), sum);
         StripReport { count, mean_length: triangles as f64 / count.max(1) as f64 }

@@ -14,7 +14,7 @@ use super::Failure;
 use super::args::{self, Input};
 use super::common::{self, Warnings};
 use super::control::Interrupt;
-use super::extract::{self, Needs};
+use super::extract::{self, Needs, StripReport};
 use super::method::Making;
 use flight::{Step, fly};
 use glam::DVec3;
@@ -70,6 +70,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = args::positive, allow_negative_numbers = true, requires = "memory",
           help_heading = "View")]
     fetches: Option<usize>,
+    /// Form triangle strips of what every frame shows, and report how long they are; not in the frame's time
+    #[arg(long, help_heading = "Report")]
+    strips: bool,
     /// Measure the error that is shown on every Kth frame
     #[arg(long, value_name = "K", value_parser = args::positive, allow_negative_numbers = true, help_heading = "Report")]
     measure_every: Option<usize>,
@@ -209,6 +212,10 @@ impl Args {
                 visible_vertices: step.scene.visible_vertices(step.camera),
                 dirty_index_bytes: step.changes.iter().map(|c| c.index_bytes()).sum(),
                 dirty_wedges: step.changes.iter().map(|c| c.wedges.len()).sum(),
+                strips: self.strips.then(|| {
+                    let meshes = 0..step.scene.views().len();
+                    StripReport::of(meshes.map(|m| step.scene.shown(m).strips()))
+                }),
                 measured,
                 on_ground,
                 ..step.timed.frame(&step.timed.done)

@@ -10,6 +10,7 @@ struct Extract {
     command: String,
     to: String,
     rule: String,
+    error: String,
     #[serde(deserialize_with = "present")]
     tau: Option<f64>,
     faces: usize,
@@ -74,6 +75,7 @@ struct Fly {
     command: String,
     path: String,
     rule: String,
+    error: String,
     #[serde(deserialize_with = "present")]
     tau: Option<f64>,
     full_faces: usize,
@@ -86,6 +88,8 @@ struct Fly {
     dirty_index_bytes: FlyStatistics,
     #[serde(deserialize_with = "present")]
     operations_per_second: Option<f64>,
+    #[serde(deserialize_with = "present")]
+    strip_length: Option<FlyStatistics>,
     #[serde(deserialize_with = "present")]
     measured_over_tau: Option<FlyStatistics>,
     above: usize,
@@ -139,6 +143,8 @@ struct FlyFrame {
     visible_vertices: usize,
     dirty_index_bytes: usize,
     dirty_wedges: usize,
+    #[serde(deserialize_with = "present")]
+    strips: Option<ExtractStrips>,
     #[serde(deserialize_with = "present")]
     fetched: Option<usize>,
     #[serde(deserialize_with = "present")]
@@ -222,6 +228,16 @@ fn selective_commands_print_one_object_with_the_documented_fields() {
     );
     assert!(e.paging.is_none() && f.paging.is_none() && f.frames[0].fetched.is_none());
     assert_eq!((e.rule.as_str(), f.rule.as_str()), ("rings", "rings"));
+    assert_eq!((e.error.as_str(), f.error.as_str()), ("uniform", "uniform"));
+    assert!(f.strip_length.is_none() && f.frames[0].strips.is_none());
+    let d: Fly = serde_json::from_str(&of(
+        "fly in.obj --path circle --frames 3 --measure-every 2 --samples 500 --error directional --strips --json",
+    ))
+    .unwrap();
+    assert!(d.error == "directional" && d.faces.mean <= f.faces.mean && d.above == 0);
+    let strips = d.frames[1].strips.as_ref().unwrap();
+    assert!((strips.mean_length * strips.count as f64 - d.frames[1].faces as f64).abs() < 1e-6);
+    assert!(d.strip_length.is_some_and(|s| s.mean > 2.0));
     assert!(e.guard.is_none() && f.guard.is_none());
     let t: Extract =
         serde_json::from_str(&of("extract in.obj out.ply --camera cam.json --tau 2 --rule truly --json"))

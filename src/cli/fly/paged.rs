@@ -2,13 +2,13 @@
 
 use super::super::Failure;
 use super::super::control::Interrupt;
+use super::super::extract::StripReport;
 use super::super::paging::{self, Paging};
 use super::Args;
 use super::pace::Pace;
-use super::path::Source;
+use super::path::{Course, Source};
 use super::report::{Frame, Memory, Report};
 use progmesh::refine::paged::PagedLimits;
-use progmesh::refine::view::Camera;
 use progmesh::selective::PagedScene;
 use std::time::Instant;
 
@@ -20,10 +20,10 @@ impl Args {
         interrupt: &Interrupt,
     ) -> Result<Report, Failure> {
         let file = self.input.name();
-        // What looks at the whole mesh, or draws.
+        // What looks at the whole mesh, or follows the changes of views that hold it.
         let measuring = self.measure_every.map(|_| "--measure-every");
         let morphing = self.geomorph.map(|_| "--geomorph");
-        let given = [measuring, morphing, self.path.given(), self.shots.given(), self.play.given()];
+        let given = [measuring, morphing, self.path.given(), self.play.given()];
         if let Some(flag) = given.into_iter().flatten().next() {
             return Err(Failure::Usage(format!("--memory and {flag} do not go together")));
         }
@@ -32,7 +32,7 @@ impl Args {
         let read = start.elapsed().as_secs_f64();
         let course = self.path.lay(source, scene.bounds(), &file)?;
         let mut most = scene.bytes();
-        let frames = self.fly_paged(&mut scene, &course.cameras, interrupt, &mut most)?;
+        let frames = self.fly_paged(&mut scene, &course, interrupt, &mut most)?;
         self.something_seen(&frames, scene.bounds())?;
         let (held, shown) = (scene.bytes(), scene.shown_bytes());
         let memory = Memory {
@@ -58,16 +58,17 @@ impl Args {
     fn fly_paged(
         &self,
         scene: &mut PagedScene,
-        path: &[Camera],
+        course: &Course<'_>,
         interrupt: &Interrupt,
         most: &mut usize,
     ) -> Result<Vec<Frame>, Failure> {
         let file = self.input.name();
         let mut pace = Pace::new(self.setting(self.needs.tau, interrupt));
         let fetches = self.fetches.unwrap_or(usize::MAX);
-        let mut frames = Vec::with_capacity(path.len());
+        let mut frames = Vec::with_capacity(course.cameras.len());
+        let (bounds, mut shots) = (scene.bounds(), self.shots.start(course));
         scene.take_changes();
-        for camera in path {
+        for (number, camera) in course.cameras.iter().enumerate() {
             let timed = pace.frame(&file, |tau, cull, limits| {
                 scene.adapt(camera, tau, cull, &PagedLimits { limits: *limits, fetches })
             })?;
@@ -75,17 +76,20 @@ impl Args {
             *most = scene.bytes().max(*most);
             pace.note(scene.face_count(), &done.done);
             let (dirty_index_bytes, dirty_wedges) = scene.take_changes();
+            shots.draw(number, camera, || (scene.to_scene(), bounds, scene.face_count()))?;
             frames.push(Frame {
                 faces: scene.face_count(),
                 vertices: scene.vertex_count(),
                 visible_vertices: scene.visible_vertices(camera),
                 dirty_index_bytes,
                 dirty_wedges,
+                strips: self.strips.then(|| StripReport::of(scene.views().iter().map(|v| v.strips()))),
                 fetched: Some(done.fetched),
                 no_room: Some(done.no_room),
                 ..timed.frame(&done.done)
             });
         }
+        shots.write()?;
         Ok(frames)
     }
 }

@@ -1,5 +1,6 @@
 //! What a flight came to.
 
+use super::super::extract::StripReport;
 use super::super::paging::Paging;
 use super::super::rule::Guard;
 use super::common::{short, thousands};
@@ -23,6 +24,7 @@ pub(super) struct Report {
     morphing: Statistics,
     dirty_index_bytes: Statistics,
     operations_per_second: Option<f64>,
+    strip_length: Option<Statistics>,
     measured_over_tau: Option<Statistics>,
     pub(super) above: usize,
     cracks: Option<usize>,
@@ -50,6 +52,7 @@ pub(super) struct Frame {
     pub(super) visible_vertices: usize,
     pub(super) dirty_index_bytes: usize,
     pub(super) dirty_wedges: usize,
+    pub(super) strips: Option<StripReport>,
     pub(super) fetched: Option<usize>,
     pub(super) no_room: Option<usize>,
     pub(super) measured: Option<Measured>,
@@ -166,6 +169,7 @@ impl Report {
             morphing: of(&|f| f.morphing as f64),
             dirty_index_bytes: of(&|f| f.dirty_index_bytes as f64),
             operations_per_second: (operations > 0 && time > 0.0).then(|| operations as f64 / time),
+            strip_length: Statistics::of(later.iter().filter_map(|f| Some(f.strips?.mean_length))),
             measured_over_tau: Statistics::of(frames.iter().filter_map(ratio)),
             above: above.count(),
             cracks: sum(&|g| g.cracks),
@@ -200,6 +204,9 @@ impl Report {
         lines.push(s("index bytes to upload", &self.dirty_index_bytes));
         if self.morphing.max > 0.0 {
             lines.push(s("vertices on the way", &self.morphing));
+        }
+        if let Some(x) = &self.strip_length {
+            lines.push(s("triangles in a strip", x));
         }
         if let Some(m) = &self.measured_over_tau {
             lines.push(s("measured error / tau", m));

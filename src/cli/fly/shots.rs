@@ -57,12 +57,6 @@ pub(super) struct Shots<'a> {
 }
 
 impl ShotArgs {
-    /// A flag that was given, if any was.
-    pub(super) fn given(&self) -> Option<&'static str> {
-        let png = self.png_every.map(|_| "--png-every");
-        png.or(self.apng.as_ref().map(|_| "--apng"))
-    }
-
     /// Fails, before any work is done, where nothing could be written.
     pub(super) fn check(&self) -> Result<(), Failure> {
         if let Some(w) = self.png_width.filter(|w| !(SIDES[0]..=SIDES[1]).contains(w)) {

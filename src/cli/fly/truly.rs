@@ -2,10 +2,12 @@
 
 use super::super::Failure;
 use super::super::control::Interrupt;
+use super::super::extract::StripReport;
 use super::super::rule::Guard;
 use super::pace::{Measuring, Pace};
 use super::report::Frame;
 use super::{Args, path};
+use progmesh::refine::Strips;
 use progmesh::selective::{SelectiveScene, TrulyScene};
 
 impl Args {
@@ -50,6 +52,9 @@ impl Args {
                 visible_vertices: truly.visible_vertices(camera),
                 dirty_index_bytes,
                 dirty_wedges,
+                strips: self
+                    .strips
+                    .then(|| StripReport::of(truly.views().iter().map(|v| Strips::new(v.indices())))),
                 measured,
                 on_ground,
                 ..timed.frame(&timed.done)
