@@ -91,6 +91,7 @@ fn wrong_cameras_and_paths_are_named() {
         ("fly in.ply --path circle --rule truly --memory 64", 2, "--memory"),
         ("extract in.ply out.ply --camera cam.json --rule rings --no-guard", 2, "--rule truly"),
         ("extract in.ply out.ply --camera cam.json --no-guard", 2, "--rule"),
+        ("fly in.ply --path circle --rule cuts --error directional", 2, "--rule rings"),
     ] {
         let run = p.run(arguments);
         assert_eq!(run.code, code, "{arguments}: {}", run.stderr);
@@ -207,6 +208,19 @@ fn with_a_limit_of_memory_the_same_is_shown_of_fewer_bytes() {
             assert_eq!(whole["frames"][k][field], paged["frames"][k][field], "{field} of frame {k}");
         }
     }
+    // Circles are about the same box; what is shown is drawn, and measured with a word about the memory that takes.
+    let circle = "fly in.pm --path circle --frames 3 --tau 2 --json -q --png-every 2 --png-width 64 --png-to";
+    let (whole, paged) =
+        (p.done(&format!("{circle} a")).json(), p.done(&format!("{circle} b --memory 64 --strips")).json());
+    for k in 0..3 {
+        assert_eq!(whole["frames"][k]["faces"], paged["frames"][k]["faces"]);
+    }
+    assert!(p.read("a/frame00002.png") == p.read("b/frame00002.png") && !p.exists("b/frame00001.png"));
+    assert!(paged["strip_length"]["mean"].as_f64().is_some_and(|n| n > 2.0));
+    let measure = format!("{flight} --measure-every 2 --samples 2000");
+    let (whole, paged) = (p.done(&measure).json(), p.done(&format!("{measure} --memory 64")).json());
+    assert_eq!(whole["measured_over_tau"], paged["measured_over_tau"]);
+    assert!(paged["warnings"][0].as_str().is_some_and(|w| w.contains("beyond --memory")));
     // What needs several chunks comes with the frames.
     let fine = flight.replace("--tau 2", "--tau 0.5 --memory 64");
     let (slow, all) = (p.done(&format!("{fine} --fetches 1")).json(), p.done(&fine).json());
@@ -261,7 +275,8 @@ fn what_cannot_be_read_in_parts_is_told() {
         ("extract cut.pm out.ply --camera cam.json --memory 64", 3, "shorter than it says"),
         ("extract in.pm out.ply --camera cam.json --memory 1", 3, "the limit of 1048576 bytes is too small"),
         ("extract in.pm out.ply --camera cam.json --memory 0", 2, "1 or more"),
-        ("fly in.pm --path circle --memory 64 --measure-every 2", 2, "--measure-every"),
+        ("fly in.pm --path circle --memory 64 --html a.html", 2, "--html"),
+        ("fly in.pm --path circle --memory 64 --error directional", 2, "--error directional"),
         ("fly in.pm --path circle --fetches 2", 2, "--memory"),
     ] {
         let run = p.run(arguments);

@@ -22,7 +22,7 @@ use pace::{Measuring, Setting};
 use path::PathArgs;
 use play::PlayArgs;
 use progmesh::refine::view::Camera;
-use progmesh::selective::{Geomorph, SelectiveScene};
+use progmesh::selective::{Geomorph, Judge, SelectiveScene};
 use report::{Frame, Memory, Report};
 use shots::ShotArgs;
 
@@ -73,7 +73,7 @@ pub(crate) struct Args {
     /// Form triangle strips of what every frame shows, and report how long they are; not in the frame's time
     #[arg(long, help_heading = "Report")]
     strips: bool,
-    /// Measure the error that is shown on every Kth frame
+    /// Measure the error that is shown on every Kth frame; with --memory all of the mesh is read for that, once
     #[arg(long, value_name = "K", value_parser = args::positive, allow_negative_numbers = true, help_heading = "Report")]
     measure_every: Option<usize>,
     /// Samples of the input to measure at
@@ -171,6 +171,11 @@ impl Args {
         )))
     }
 
+    /// Samples of the finest surfaces.
+    fn judge(&self, scene: &SelectiveScene) -> Result<Judge, Failure> {
+        Judge::new(scene, self.samples).map_err(|e| Failure::Input(format!("{}: {e}", self.input.name())))
+    }
+
     fn setting<'a>(&'a self, tau: f64, interrupt: &'a Interrupt) -> Setting<'a> {
         Setting {
             tau,
@@ -190,7 +195,7 @@ impl Args {
         interrupt: &Interrupt,
     ) -> Result<(Vec<Frame>, [usize; 3]), Failure> {
         let file = self.input.name();
-        let measuring = Measuring::new(self.measure_every, scene, self.samples, course, &file)?;
+        let measuring = Measuring::new(self.measure_every, course, &file, || self.judge(scene))?;
         let path: &[Camera] = &course.cameras;
         let mut frames = Vec::with_capacity(path.len());
         let mut shots = self.shots.start(course);

@@ -2,9 +2,11 @@
 
 use super::judge_directional::Spheres;
 use super::{Deviation, SelectiveScene};
+use crate::progressive::ProgressiveScene;
+use crate::refine::progressive::ProgressiveMesh;
 use crate::refine::view::Camera;
 use crate::simplify::measure::{MeasureError, Surface};
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 
 /// Samples of the finest surface, spread evenly over its area.
 #[derive(Clone, Debug)]
@@ -30,10 +32,27 @@ impl Judge {
     ///
     /// Errors: a damaged mesh.
     pub fn new(scene: &SelectiveScene, count: usize) -> Result<Judge, super::SelectiveError> {
+        let meshes = scene.views.iter().map(|v| v.hierarchy().mesh());
+        Ok(Judge { deviation: scene.deviation, ..Judge::of_meshes(meshes.zip(&scene.places), count)? })
+    }
+
+    /// The same of a scene that is refined in parts ([`super::PagedScene`]): its meshes, all in memory, from which the samples are taken.
+    ///
+    /// Errors: a damaged mesh.
+    pub fn of_progressive(scene: &ProgressiveScene, count: usize) -> Result<Judge, super::SelectiveError> {
+        let places = super::places_of(&scene.shell, scene.meshes.len());
+        Judge::of_meshes(scene.meshes.iter().zip(&places), count)
+    }
+
+    /// Of meshes, and where they stand.
+    fn of_meshes<'a>(
+        meshes: impl Iterator<Item = (&'a ProgressiveMesh, &'a Vec<DMat4>)>,
+        count: usize,
+    ) -> Result<Judge, super::SelectiveError> {
         let mut faces: Vec<[DVec3; 3]> = Vec::new();
-        for (mesh, (view, places)) in scene.views.iter().zip(&scene.places).enumerate() {
+        for (mesh, (pm, places)) in meshes.enumerate() {
             let damage = |source| super::SelectiveError::Damage { mesh, source };
-            let mut full = view.hierarchy().mesh().cursor().map_err(damage)?;
+            let mut full = pm.cursor().map_err(damage)?;
             full.seek(usize::MAX).map_err(damage)?;
             for m in places {
                 let at = |w: &u32| m.transform_point3(full.positions().get(full.wedge_vertex(*w) as usize));
@@ -58,7 +77,7 @@ impl Judge {
             let (u, v) = (at(2).sqrt(), at(3));
             Some([t[0] * (1.0 - u) + t[1] * (u * (1.0 - v)) + t[2] * (u * v), normal(t)])
         };
-        Ok(Judge { samples: (0..count).filter_map(sample).collect(), deviation: scene.deviation })
+        Ok(Judge { samples: (0..count).filter_map(sample).collect(), deviation: Deviation::Uniform })
     }
 
     /// The same judge of deviations that count so. Of directional ones: of a sample p the least of `sqrt(across^2 + (along / 4)^2)` over all places q of what is shown, across and along being the parts of q - p

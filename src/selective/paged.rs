@@ -4,7 +4,7 @@ use super::{places_of, shared};
 use crate::aif::NONE;
 use crate::io::DecodeError;
 use crate::io::grid::ReadAt;
-use crate::io::pm;
+use crate::io::pm::{self, Extent, Shelled};
 use crate::refine::format::{ByteRanges, ChunkType, FormatError, RangeReader};
 use crate::refine::paged::{PagedDone, PagedError, PagedLimits, PagedView, Traffic};
 use crate::refine::selective::{Cull, LensError, Limits};
@@ -70,6 +70,7 @@ pub struct PagedScene {
     shell: Scene,
     views: Vec<PagedView<Ranges>>,
     places: Vec<Vec<DMat4>>,
+    boxes: Vec<Option<Extent>>,
     limit: usize,
     file_bytes: u64,
     shell_bytes: u64,
@@ -95,7 +96,7 @@ impl PagedScene {
             _ => None,
         };
         let shell_bytes = of_scene.map_or(0, |c| c.stored);
-        let shell = pm::shell(bytes.as_deref(), meshes)?;
+        let Shelled { scene: shell, boxes, .. } = pm::shell(bytes.as_deref(), meshes)?;
         let chunks = directory.chunks.iter().filter(|c| c.kind == ChunkType::SPLITS).count();
         let mut views: Vec<PagedView<Ranges>> = Vec::new();
         let mut held = 0;
@@ -106,7 +107,7 @@ impl PagedScene {
             views.push(view);
         }
         let places = places_of(&shell, meshes);
-        Ok(PagedScene { shell, views, places, limit, file_bytes, shell_bytes, chunks })
+        Ok(PagedScene { shell, views, places, boxes, limit, file_bytes, shell_bytes, chunks })
     }
 
     /// The views, one a mesh.
@@ -181,18 +182,22 @@ impl PagedScene {
         all
     }
 
-    /// Least and greatest coordinates in the world of boxes about the meshes, each with the middle and the diagonal of the finest mesh's and the shape of the base's; `None` if nothing is
-    /// shown.
+    /// Least and greatest coordinates, in the world, of the boxes of the meshes at full detail, which stand in the file (with quantised places: those before they were rounded); of a file without them of
+    /// boxes with the middle and the diagonal of the finest mesh's and the shape of the base's. `None` if nothing is shown.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let mut all: Option<(DVec3, DVec3)> = None;
-        for (view, places) in self.views.iter().zip(&self.places) {
-            let ((middle, diagonal), Some((lo, hi))) = (view.extent(), view.base_box()) else { continue };
-            let size = hi - lo;
-            let half = 0.5 * size * (diagonal / size.length().max(f64::MIN_POSITIVE)).min(1e9);
+        for (mesh, (view, places)) in self.views.iter().zip(&self.places).enumerate() {
+            let about = || {
+                let ((middle, diagonal), (lo, hi)) = (view.extent(), view.base_box()?);
+                let size = hi - lo;
+                let half = 0.5 * size * (diagonal / size.length().max(f64::MIN_POSITIVE)).min(1e9);
+                Some((middle - half, middle + half))
+            };
+            let Some((lo, hi)) = self.boxes.get(mesh).copied().flatten().or_else(about) else { continue };
             for m in places {
                 for k in 0..8u32 {
-                    let pick = |axis: usize| if k >> axis & 1 == 1 { half[axis] } else { -half[axis] };
-                    let p = m.transform_point3(middle + DVec3::new(pick(0), pick(1), pick(2)));
+                    let pick = |axis: usize| if k >> axis & 1 == 1 { hi[axis] } else { lo[axis] };
+                    let p = m.transform_point3(DVec3::new(pick(0), pick(1), pick(2)));
                     all = Some(all.map_or((p, p), |(lo, hi)| (lo.min(p), hi.max(p))));
                 }
             }
@@ -281,6 +286,11 @@ impl PagedScene {
             mesh.geometry = geometry;
         }
         scene
+    }
+
+    /// The triangles shown, in the world: three corners each. What this takes comes on top of the limit.
+    pub fn triangles(&self) -> Vec<[DVec3; 3]> {
+        shared::triangles(self.views.iter(), &self.places)
     }
 
     /// Vertices that a camera's frustum holds, of those shown, places counted each.

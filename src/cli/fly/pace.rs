@@ -7,7 +7,7 @@ use super::report::{Frame, Measured, OnGround};
 use glam::DVec3;
 use progmesh::refine::selective::{Cull, Done, Limits, Regulator};
 use progmesh::refine::view::Camera;
-use progmesh::selective::{Ground, Judge, SelectiveScene};
+use progmesh::selective::{Ground, Judge};
 use std::time::{Duration, Instant};
 
 /// How a flight refines.
@@ -101,23 +101,16 @@ pub(super) struct Measuring<'a> {
 }
 
 impl<'a> Measuring<'a> {
-    /// With so many samples of the finest surfaces of `scene`; over terrain with those of its grid.
+    /// By the judge that is made if need be; over terrain by the samples of its grid.
     ///
-    /// Errors: a damaged mesh.
+    /// Errors: those of `judge`.
     pub(super) fn new(
         every: Option<usize>,
-        scene: &SelectiveScene,
-        samples: usize,
         course: &'a Course<'_>,
         file: &'a str,
+        judge: impl FnOnce() -> Result<Judge, Failure>,
     ) -> Result<Self, Failure> {
-        let judge = match every.filter(|_| course.ground.is_none()) {
-            Some(_) => {
-                let judge = Judge::new(scene, samples);
-                Some(judge.map_err(|e| Failure::Input(format!("{file}: {e}")))?)
-            }
-            None => None,
-        };
+        let judge = every.filter(|_| course.ground.is_none()).map(|_| judge()).transpose()?;
         Ok(Measuring { every, judge, ground: course.ground.as_ref(), file })
     }
 

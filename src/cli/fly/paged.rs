@@ -1,15 +1,16 @@
 //! `fly --memory`: of a file only what the frames need.
 
 use super::super::Failure;
+use super::super::common::Warnings;
 use super::super::control::Interrupt;
 use super::super::extract::StripReport;
 use super::super::paging::{self, Paging};
 use super::Args;
-use super::pace::Pace;
+use super::pace::{Measuring, Pace};
 use super::path::{Course, Source};
 use super::report::{Frame, Memory, Report};
 use progmesh::refine::paged::PagedLimits;
-use progmesh::selective::PagedScene;
+use progmesh::selective::{Judge, PagedScene};
 use std::time::Instant;
 
 impl Args {
@@ -21,9 +22,8 @@ impl Args {
     ) -> Result<Report, Failure> {
         let file = self.input.name();
         // What looks at the whole mesh, or follows the changes of views that hold it.
-        let measuring = self.measure_every.map(|_| "--measure-every");
         let morphing = self.geomorph.map(|_| "--geomorph");
-        let given = [measuring, morphing, self.path.given(), self.play.given()];
+        let given = [morphing, self.path.given(), self.play.given()];
         if let Some(flag) = given.into_iter().flatten().next() {
             return Err(Failure::Usage(format!("--memory and {flag} do not go together")));
         }
@@ -46,6 +46,11 @@ impl Args {
         let path = self.path.name().to_string();
         let mut report = Report::new(path, self.needs.tau, scene.full_faces(), frames, memory, [read, 0.0]);
         report.paging = Some(Paging::of(&scene, mib, most));
+        if self.measure_every.is_some() && course.ground.is_none() {
+            report.warnings.push(format!(
+                "{file}: to measure, all of the mesh was in memory before the flight, beyond --memory; while it is flown only the samples are"
+            ));
+        }
         if short > 0 {
             report.warnings.push(format!(
                 "{file}: {mib} MiB were too little for {}: they are coarser than asked",
@@ -53,6 +58,17 @@ impl Args {
             ));
         }
         Ok(report)
+    }
+
+    /// Samples of the finest surfaces: the one thing that takes all of the file, before the flight. What was read is given back then.
+    fn judge_of_file(&self) -> Result<Judge, Failure> {
+        let file = self.input.name();
+        // What reading has to say, it has said.
+        let mut silent = Warnings::new(true);
+        let whole = self.input.read_or_make(&mut silent, |_, _| {
+            Err(Failure::Usage(format!("{file}: --memory is for .pm files")))
+        })?;
+        Judge::of_progressive(&whole, self.samples).map_err(|e| Failure::Input(format!("{file}: {e}")))
     }
 
     fn fly_paged(
@@ -63,6 +79,7 @@ impl Args {
         most: &mut usize,
     ) -> Result<Vec<Frame>, Failure> {
         let file = self.input.name();
+        let measuring = Measuring::new(self.measure_every, course, &file, || self.judge_of_file())?;
         let mut pace = Pace::new(self.setting(self.needs.tau, interrupt));
         let fetches = self.fetches.unwrap_or(usize::MAX);
         let mut frames = Vec::with_capacity(course.cameras.len());
@@ -77,6 +94,7 @@ impl Args {
             pace.note(scene.face_count(), &done.done);
             let (dirty_index_bytes, dirty_wedges) = scene.take_changes();
             shots.draw(number, camera, || (scene.to_scene(), bounds, scene.face_count()))?;
+            let (measured, on_ground) = measuring.measure(number, camera, || scene.triangles())?;
             frames.push(Frame {
                 faces: scene.face_count(),
                 vertices: scene.vertex_count(),
@@ -84,6 +102,8 @@ impl Args {
                 dirty_index_bytes,
                 dirty_wedges,
                 strips: self.strips.then(|| StripReport::of(scene.views().iter().map(|v| v.strips()))),
+                measured,
+                on_ground,
                 fetched: Some(done.fetched),
                 no_room: Some(done.no_room),
                 ..timed.frame(&done.done)

@@ -30,7 +30,7 @@ impl Args {
     ) -> Result<(Vec<Frame>, [usize; 3], Guard), Failure> {
         let file = self.input.name();
         let failed = |e: &dyn std::fmt::Display| Failure::Input(format!("{file}: {e}"));
-        let measuring = Measuring::new(self.measure_every, &scene, self.samples, course, &file)?;
+        let measuring = Measuring::new(self.measure_every, course, &file, || self.judge(&scene))?;
         let mut truly = TrulyScene::new(&scene, self.needs.rule.guard()).map_err(|e| failed(&e))?;
         let bounds = scene.bounds();
         drop(scene);

@@ -7,7 +7,7 @@ use crate::io::DecodeError;
 use crate::io::gltf::{Source, SurfaceTable};
 use crate::progressive::Leftover;
 use crate::scene::{Group, Image, Material, Node, Scene, SceneMesh};
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
@@ -33,7 +33,13 @@ struct MeshShell<'a> {
     groups: Vec<GroupShell<'a>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     leftover: Option<LeftoverShell>,
+    /// Six f64: least and greatest coordinates at full detail.
+    #[serde(default, rename = "box", skip_serializing_if = "Option::is_none")]
+    extent: Option<Span>,
 }
+
+/// Least and greatest coordinates of a mesh.
+pub type Extent = (DVec3, DVec3);
 
 /// Faces that no mesh can hold: where the arrays of [`Leftover`] are, little-endian.
 #[derive(Serialize, Deserialize)]
@@ -118,8 +124,9 @@ pub(super) fn wrong(element: &str, what: impl Into<String>) -> DecodeError {
     DecodeError::Element { element: element.into(), what: what.into() }
 }
 
-/// A scene without the geometry of its meshes as bytes, with the faces that their meshes cannot hold.
-pub fn write_shell(scene: &Scene, leftovers: &[Leftover]) -> Vec<u8> {
+/// A scene without the geometry of its meshes as bytes, with the faces that their meshes cannot hold and, as far as they are given, the boxes of the meshes at full detail: who reads the file in parts cannot
+/// know these.
+pub fn write_shell(scene: &Scene, leftovers: &[Leftover], boxes: &[Option<Extent>]) -> Vec<u8> {
     let mut bytes: Vec<u8> = Vec::new();
     let mut keep = |data: &[u8]| -> Span {
         let at = bytes.len() as u64;
@@ -148,6 +155,10 @@ pub fn write_shell(scene: &Scene, leftovers: &[Leftover]) -> Vec<u8> {
                         present: keep(&bytes_of(&l.present, |x| x.to_le_bytes())),
                         rows: keep(&bytes_of(&l.rows, |x| x.to_le_bytes())),
                     }
+                }),
+                extent: boxes.get(i).copied().flatten().map(|(lo, hi)| {
+                    let all: Vec<f64> = lo.to_array().into_iter().chain(hi.to_array()).collect();
+                    keep(&bytes_of(&all, f64::to_le_bytes))
                 }),
                 name: text(&m.name),
                 groups: m
@@ -221,10 +232,21 @@ fn values_of<T, const N: usize>(bytes: &[u8], value: impl Fn([u8; N]) -> T) -> V
     bytes.as_chunks::<N>().0.iter().map(|&b| value(b)).collect()
 }
 
-/// The scene and the leftovers that [`write_shell`] wrote. The meshes have no geometry.
+/// What stands around meshes.
+#[derive(Clone, Debug, Default)]
+pub struct Shelled {
+    /// The meshes have no geometry.
+    pub scene: Scene,
+    /// Faces that the meshes cannot hold; empty if there are none.
+    pub leftovers: Vec<Leftover>,
+    /// Boxes of the meshes at full detail, where they were written.
+    pub boxes: Vec<Option<Extent>>,
+}
+
+/// What [`write_shell`] wrote: the scene, whose meshes have no geometry, the leftovers, and the boxes.
 ///
-/// Errors: what is not as [`write_shell`] writes it; indices of what is not there; nodes that are no forest.
-pub fn read_shell(bytes: &[u8]) -> Result<(Scene, Vec<Leftover>), DecodeError> {
+/// Errors: boxes that are none; what is not as [`write_shell`] writes it; indices of what is not there; nodes that are no forest.
+pub fn read_shell(bytes: &[u8]) -> Result<Shelled, DecodeError> {
     let short = || wrong("scene", "ends too early");
     let (length, rest) = bytes.split_first_chunk::<4>().ok_or_else(short)?;
     let (json, data) = rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or_else(short)?;
@@ -235,8 +257,17 @@ pub fn read_shell(bytes: &[u8]) -> Result<(Scene, Vec<Leftover>), DecodeError> {
     };
     let owned = |s: Option<Cow<'_, str>>| s.map(Cow::into_owned);
     let mut scene = Scene { roots: shell.roots, ..Default::default() };
-    let mut leftovers = Vec::new();
-    for m in shell.meshes {
+    let (mut leftovers, mut boxes) = (Vec::new(), Vec::new());
+    for (i, m) in shell.meshes.into_iter().enumerate() {
+        let extent = m.extent.map(|s| -> Result<Extent, DecodeError> {
+            let none = || wrong(&format!("mesh {i}"), "its box is none");
+            let all = values_of(span(s)?, f64::from_le_bytes);
+            let [a, b, c, x, y, z] = all[..].try_into().map_err(|_| none())?;
+            let (lo, hi) = (DVec3::new(a, b, c), DVec3::new(x, y, z));
+            // Not the comparison turned round: NaN is none.
+            if lo.is_finite() && hi.is_finite() && lo.cmple(hi).all() { Ok((lo, hi)) } else { Err(none()) }
+        });
+        boxes.push(extent.transpose()?);
         let left = m.leftover.map(|l| -> Result<Leftover, DecodeError> {
             let words = |s: Span| Ok::<_, DecodeError>(values_of(span(s)?, u32::from_le_bytes));
             Ok(Leftover {
@@ -299,7 +330,7 @@ pub fn read_shell(bytes: &[u8]) -> Result<(Scene, Vec<Leftover>), DecodeError> {
     if leftovers.iter().all(Leftover::is_empty) {
         leftovers.clear();
     }
-    Ok((scene, leftovers))
+    Ok(Shelled { scene, leftovers, boxes })
 }
 
 /// Indices lead somewhere, and the nodes are a forest of the roots.

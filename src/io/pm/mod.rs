@@ -5,7 +5,7 @@ mod chunk;
 pub mod hoppe;
 mod terrain;
 
-pub use chunk::{read_shell, write_shell};
+pub use chunk::{Extent, Shelled, read_shell, write_shell};
 pub use terrain::{Terrain, write_terrain};
 
 use super::{DecodeError, Decoded};
@@ -36,7 +36,11 @@ pub fn encode_progressive(
 ) -> Result<Vec<u8>, format::EncodeError> {
     // Their corners are in the input's numbering.
     let leftovers = if options.any_order { &[][..] } else { &scene.leftovers };
-    format::encode(&scene.meshes, &scene.turns, &write_shell(&scene.shell, leftovers), options)
+    let boxes: Vec<Option<Extent>> = match options.pages {
+        true => scene.meshes.iter().map(|m| m.full_bounds()).collect(),
+        false => Vec::new(),
+    };
+    format::encode(&scene.meshes, &scene.turns, &write_shell(&scene.shell, leftovers, &boxes), options)
 }
 
 /// Reads a progressive mesh file of either kind.
@@ -73,7 +77,10 @@ fn finish(decoded: format::Decoded, mut warnings: Vec<String>) -> Result<Decoded
     let meshes = decoded.meshes;
     let damaged = decoded.report.damage.is_some();
     let (shell, leftovers) = match decoded.scene.as_deref() {
-        Some(bytes) => read_shell(bytes)?,
+        Some(bytes) => {
+            let Shelled { scene, leftovers, .. } = read_shell(bytes)?;
+            (scene, leftovers)
+        }
         None => (plain_shell(meshes.len()), vec![]),
     };
     if shell.meshes.len() != meshes.len() && !(damaged && meshes.len() < shell.meshes.len()) {
@@ -122,10 +129,12 @@ fn check_faces(
 /// What stands around so many meshes, from the bytes that hold it, if there are any.
 ///
 /// Errors: damage; a scene of another number of meshes.
-pub(crate) fn shell(bytes: Option<&[u8]>, meshes: usize) -> Result<Scene, DecodeError> {
-    let Some(bytes) = bytes else { return Ok(plain_shell(meshes)) };
-    let shell = read_shell(bytes)?.0;
-    match shell.meshes.len() {
+pub(crate) fn shell(bytes: Option<&[u8]>, meshes: usize) -> Result<Shelled, DecodeError> {
+    let Some(bytes) = bytes else {
+        return Ok(Shelled { scene: plain_shell(meshes), ..Shelled::default() });
+    };
+    let shell = read_shell(bytes)?;
+    match shell.scene.meshes.len() {
         n if n == meshes => Ok(shell),
         n => Err(chunk::wrong("scene", format!("describes {n} meshes, the file has {meshes}"))),
     }
