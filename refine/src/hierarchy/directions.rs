@@ -215,8 +215,9 @@ mod tests {
 
     fn vectors(n: std::ops::Range<usize>) -> impl Strategy<Value = Vec<DVec3>> {
         let one = (prop::array::uniform3(-1.0..1.0f64), 0.0..1.0f64, prop::array::uniform3(-0.2..0.2f64));
-        let of = |(main, all): ([f64; 3], Vec<([f64; 3], f64, [f64; 3])>)| {
-            let about = |(any, t, off): ([f64; 3], f64, [f64; 3])| {
+        type One = ([f64; 3], f64, [f64; 3]);
+        let of = |(main, all): ([f64; 3], Vec<One>)| {
+            let about = |(any, t, off): One| {
                 let line = DVec3::from_array(main) * (2.0 * t - 1.0) + DVec3::from_array(off);
                 if t > 0.95 { DVec3::from_array(any) } else { line }
             };
