@@ -185,7 +185,8 @@ fn of_positions(
     if image.is_some() {
         geometry.face_material = vec![0; tin.triangles.len()];
     }
-    let mut scene = Scene::from_mesh(SceneMesh { name: Some(name.to_string()), geometry, groups: vec![] });
+    let mut scene =
+        Scene::from_mesh(SceneMesh { name: Some(name.to_string()), geometry, ..Default::default() });
     if let Some(image) = image {
         scene.images = vec![image];
         let material = Material { name: "drape".into(), base_color_image: Some(0), ..Default::default() };

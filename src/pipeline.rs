@@ -330,6 +330,7 @@ fn run_keeping(
     let triangles_out: usize = outcomes.iter().map(|o| o.triangles_out).sum();
     let missed = target.is_some_and(|t| triangles_out > t);
     let least_triangles = if missed { meshes.iter().map(least::triangles).sum() } else { 0 };
+    let mut loose = 0;
     for (i, mesh) in meshes.into_iter().enumerate() {
         if cfg!(debug_assertions) {
             mesh.check().map_err(|source| JobError::Broken { mesh: label(&scene, i), source })?;
@@ -337,7 +338,10 @@ fn run_keeping(
         let mut geometry = mesh.to_input();
         normals::apply(&mut geometry, job.normals)?;
         scene.meshes[i].geometry = geometry;
+        // Vertices have other numbers now.
+        loose += std::mem::take(&mut scene.meshes[i].extras.loose).vertices.len();
     }
+    warnings.extend(left_loose(loose));
     locks::restore_groups(&mut scene);
     let simplify_seconds = start.elapsed().as_secs_f64();
 
@@ -552,9 +556,10 @@ pub struct Preparation {
 /// faces stay. Returns warnings.
 pub fn prepare(scene: &mut Scene, how: &Preparation) -> Result<Vec<String>, JobError> {
     let mut changes = Changes::default();
+    let mut loose = 0;
     for i in 0..scene.meshes.len() {
         let label = label(scene, i);
-        let SceneMesh { geometry, .. } = &mut scene.meshes[i];
+        let SceneMesh { geometry, extras, .. } = &mut scene.meshes[i];
         let failed = |source| JobError::Build { mesh: label.clone(), source };
         if how.weld == Weld::No && !how.triangulate {
             geometry.validate().map_err(failed)?;
@@ -567,8 +572,15 @@ pub fn prepare(scene: &mut Scene, how: &Preparation) -> Result<Vec<String>, JobE
                 mesh = mesh.triangulate().map_err(failed)?.mesh;
             }
             *geometry = mesh.to_input();
+            loose += std::mem::take(&mut extras.loose).vertices.len();
         }
         normals::apply(geometry, how.normals)?;
     }
-    Ok(changes.warnings())
+    Ok(changes.warnings().into_iter().chain(left_loose(loose)).collect())
+}
+
+/// What is said of vertices that lost their attributes.
+pub(crate) fn left_loose(vertices: usize) -> Option<String> {
+    let of = count(vertices, "vertex");
+    (vertices > 0).then(|| format!("the attributes of {of} without a face are left out"))
 }

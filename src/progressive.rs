@@ -128,10 +128,20 @@ impl ProgressiveScene {
             let mut cursor = mesh.cursor().map_err(|e| (i, e))?;
             cursor.seek(to).map_err(|e| (i, e))?;
             let geometry = cursor.to_ordered_input();
-            scene.meshes[i].geometry = match self.leftovers.get(i).filter(|_| whole && mesh.order.is_some()) {
+            let ordered = whole && mesh.order.is_some();
+            let left = self.leftovers.get(i).filter(|l| !l.is_empty());
+            let geometry = match left.filter(|_| ordered) {
                 Some(left) => left.put_back(geometry),
                 None => geometry,
             };
+            let numbered = !scene.meshes[i].extras.of_faces.is_empty();
+            let faces = match (numbered, ordered, left) {
+                (false, ..) => None,
+                (_, true, _) => Some((0..geometry.face_count() as u32).collect()),
+                (_, _, None) => cursor.input_faces(),
+                (_, _, Some(left)) => cursor.input_faces().map(|f| left.numbers(f)),
+            };
+            scene.meshes[i].stand(geometry, faces, ordered);
         }
         Ok(scene)
     }
@@ -155,7 +165,7 @@ impl ProgressiveScene {
             let morph = Geomorph::new(mesh, from, to).map_err(|e| (i, e))?;
             let ends = [morph.coarse_faces(), morph.indices().len()];
             let rising = from <= to;
-            scene.meshes[i].geometry = morph.at(if rising { a } else { 1.0 - a });
+            scene.meshes[i].stand(morph.at(if rising { a } else { 1.0 - a }), None, false);
             triangles[0] += ends[!rising as usize];
             triangles[1] += ends[rising as usize];
         }

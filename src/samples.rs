@@ -16,9 +16,10 @@ pub fn scene(sample: Sample, name: &str) -> Scene {
         wires: sample.wires,
         wedges,
         face_material: sample.face_material,
-        face_group: vec![],
+        ..Default::default()
     };
-    let mut scene = Scene::from_mesh(SceneMesh { name: Some(name.to_string()), geometry, groups: vec![] });
+    let mut scene =
+        Scene::from_mesh(SceneMesh { name: Some(name.to_string()), geometry, ..Default::default() });
     scene.materials = sample
         .materials
         .into_iter()

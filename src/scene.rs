@@ -3,7 +3,7 @@
 //! Readers make a [`Scene`], writers take one; neither builds topology. A mesh is a [`MeshInput`], ready for
 //! [`crate::aif::Mesh::build`], and comes back from a mesh as one.
 
-use crate::aif::MeshInput;
+use crate::aif::{Encoding, MeshInput};
 use glam::DMat4;
 
 /// A file's content.
@@ -33,6 +33,73 @@ pub struct SceneMesh {
     pub geometry: MeshInput,
     /// What `geometry.face_group` indexes.
     pub groups: Vec<Group>,
+    /// What else the file says of faces and vertices. Nothing is decided by it.
+    pub extras: Extras,
+}
+
+/// What a file says of elements of a mesh that no algorithm looks at, carried to where it can be written again.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Extras {
+    /// Values of faces; `geometry.face_row` says which of them a face has.
+    pub of_faces: Vec<FaceValues>,
+    /// Attributes of vertices that no face uses.
+    pub loose: LooseRows,
+}
+
+/// A named number of every face.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaceValues {
+    /// Its name in the file.
+    pub name: String,
+    /// How the file stored it.
+    pub encoding: Encoding,
+    /// The values, exactly as stored, row by row.
+    pub values: Vec<f64>,
+}
+
+/// Rows of the layout of the mesh's wedges, for vertices that have no corner and so no wedge.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LooseRows {
+    /// The vertices, ascending.
+    pub vertices: Vec<u32>,
+    /// Channels that each has.
+    pub present: Vec<u64>,
+    /// The values, row after row.
+    pub rows: Vec<f32>,
+}
+
+impl Extras {
+    /// True if there is nothing.
+    pub fn is_empty(&self) -> bool {
+        self.of_faces.is_empty() && self.loose.vertices.is_empty()
+    }
+
+    /// The values of faces with rows for the faces of `of` in turn; those of a face without are 0.
+    pub(crate) fn by_face(mut self, of: &MeshInput) -> Self {
+        if of.face_row.len() != of.face_count() {
+            self.of_faces.clear();
+        }
+        for v in &mut self.of_faces {
+            let at = |&r: &u32| v.values.get(r as usize).copied().unwrap_or(0.0);
+            v.values = of.face_row.iter().map(at).collect();
+        }
+        self
+    }
+
+    /// Rows that all values of faces have.
+    pub fn rows(&self) -> usize {
+        self.of_faces.iter().map(|v| v.values.len()).min().unwrap_or(0)
+    }
+}
+
+impl LooseRows {
+    /// The place of each vertex's row, if they are rows of that width for so many vertices; else of none.
+    pub(crate) fn places(&self, stride: usize, vertices: usize) -> std::collections::HashMap<u32, usize> {
+        let n = self.vertices.len();
+        let fits = self.present.len() == n && self.rows.len() == n * stride;
+        let own = self.vertices.iter().copied().filter(|&v| fits && (v as usize) < vertices);
+        own.zip(0..).collect()
+    }
 }
 
 /// Faces that belong together: OBJ's `o`, `g` and `s`, or a glTF primitive.
@@ -181,6 +248,19 @@ impl Scene {
 }
 
 impl SceneMesh {
+    /// Sets the geometry, and keeps of the extras what goes with it. Their values of faces are those of the input's faces in turn: `faces` are the numbers there of the geometry's faces, if they are
+    /// known; `whole` says that it has the input's vertices.
+    pub(crate) fn stand(&mut self, geometry: MeshInput, faces: Option<Vec<u32>>, whole: bool) {
+        self.geometry = geometry;
+        if !whole {
+            self.extras.loose = LooseRows::default();
+        }
+        match faces {
+            Some(faces) if !self.extras.of_faces.is_empty() => self.geometry.face_row = faces,
+            _ => self.extras.of_faces.clear(),
+        }
+    }
+
     /// Number of triangles its faces make.
     pub fn triangles(&self) -> usize {
         match &self.geometry.face_sizes {

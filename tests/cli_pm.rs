@@ -76,6 +76,81 @@ fn the_scene_around_the_meshes_comes_back() {
     }
 }
 
+/// A PLY whose faces have a number, flags and a quality; one vertex has no face, one face no area.
+fn valued_ply() -> Vec<u8> {
+    let n = 12u32;
+    let mut out = b"ply\nformat binary_little_endian 1.0\nelement vertex 145\nproperty float x\nproperty float y\nproperty float z\nproperty int flags\nproperty float quality\nelement face 223\nproperty list uchar int vertex_indices\nproperty int id\nproperty uchar flags\nproperty double quality\nend_header\n".to_vec();
+    for v in 0..n * n + 1 {
+        let (x, y) = ((v % n) as f32, (v / n) as f32);
+        [x, y, (x * 1.3).sin() + (y * 0.7).cos()].iter().for_each(|c| out.extend(c.to_le_bytes()));
+        out.extend((v as i32 - 70).to_le_bytes());
+        out.extend((v as f32 / 7.0).to_le_bytes());
+    }
+    let mut id = 0u32;
+    let mut face = |corners: &[u32]| {
+        out.push(corners.len() as u8);
+        corners.iter().for_each(|c| out.extend(c.to_le_bytes()));
+        out.extend(id.to_le_bytes());
+        out.push((id % 251) as u8);
+        out.extend((id as f64 / 3.0).to_le_bytes());
+        id += 1;
+    };
+    for y in 0..n - 1 {
+        for x in 0..n - 1 {
+            let a = y * n + x;
+            match (x + y) % 6 {
+                0 => face(&[a, a + 1, a + n + 1, a + n]),
+                _ => [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]].iter().for_each(|f| face(f)),
+            }
+        }
+    }
+    face(&[5, 5, 6]);
+    let count = id;
+    let header = format!("element face {count}\n").into_bytes();
+    let at = out.windows(13).position(|w| w == b"element face ").unwrap();
+    out.splice(at..at + 17, header);
+    out
+}
+
+#[test]
+fn values_of_faces_and_of_vertices_without_a_face_come_back() {
+    let p = Place::new();
+    p.write("in.ply", valued_ply());
+    p.done("convert in.ply same.ply");
+    let run = p.done("encode in.ply in.pm --placement endpoint");
+    assert!(!run.stderr.contains("left out"), "{}", run.stderr);
+    p.done("decode in.pm back.ply -q");
+    assert!(p.read("back.ply") == p.read("same.ply"));
+    assert!(p.read("same.ply") == valued_ply(), "nothing is lost, nothing moved");
+    // A coarser mesh: every face has the values of a face of the input, no two (polygons apart) the same.
+    for command in
+        ["decode in.pm few.ply --triangles 60 --text", "simplify in.ply few.ply --triangles 60 --text"]
+    {
+        p.done(command);
+        let text = String::from_utf8(p.read("few.ply")).unwrap();
+        let count = |what: &str| -> usize {
+            let line = text.lines().find(|l| l.starts_with(what)).unwrap();
+            line.rsplit(' ').next().unwrap().parse().unwrap()
+        };
+        let (vertices, faces) = (count("element vertex"), count("element face"));
+        let body = text.split_once("end_header\n").unwrap().1;
+        let mut seen = std::collections::BTreeMap::new();
+        for line in body.lines().skip(vertices) {
+            let words: Vec<f64> = line.split(' ').map(|w| w.parse().unwrap()).collect();
+            let &[id, flags, quality] = &words[words.len() - 3..] else { panic!("{line}") };
+            assert_eq!((flags, quality), (id % 251.0, id / 3.0), "{command}: {line}");
+            *seen.entry(id as u32).or_insert(0) += 1;
+        }
+        assert!((20..=60).contains(&faces) && seen.values().sum::<usize>() == faces);
+        assert!(seen.values().all(|&n| n <= 2));
+    }
+    let run = p.done("convert in.pm out.obj");
+    assert!(run.stderr.contains("values of faces flags, id, quality are left out"), "{}", run.stderr);
+    let run = p.done("encode in.ply any.pm --any-order");
+    assert!(run.stderr.contains("values of faces"), "{}", run.stderr);
+    p.done("decode any.pm any.ply -q");
+}
+
 #[test]
 fn a_gltf_document_survives() {
     let p = Place::new();

@@ -408,6 +408,27 @@ fn joints_weights_and_morph_targets_come_back() {
 }
 
 #[test]
+fn normals_tangents_and_weights_that_are_right_but_for_rounding_stay_bit_for_bit() {
+    let mut b = square();
+    let normals =
+        [0.978603, 0.124694, 0.163672, -0.497455, -0.86749, 0.0, 0.0, 1.0, 0.0, 0.577, 0.577, 0.577f32];
+    let tangents = [0.996229, 0.0, 0.086769, 1.0].repeat(4);
+    let weights = [0.3, 0.7, 0.0, 0.0, 0.1, 0.2, 0.7, 0.0, 1.0, 0.0, 0.0, 0.0, 0.6, 0.3, 0.05, 0.05];
+    let n = b.floats(&normals, "VEC3", 3);
+    let t = b.floats(&tangents, "VEC4", 4);
+    let w = b.floats(&weights, "VEC4", 4);
+    let j = b.accessor(&[0, 1, 0, 0, 0, 1, 2, 0, 3, 0, 0, 0, 0, 1, 2, 3], 5121, 4, "VEC4", json!({}));
+    b.doc["meshes"][0]["primitives"][0]["attributes"] =
+        json!({"POSITION": 0, "NORMAL": n, "TANGENT": t, "JOINTS_0": j, "WEIGHTS_0": w});
+    let (doc, bin) = open(&encode(Format::Glb, &b.decode().scene).bytes);
+    let p = &doc["meshes"][0]["primitives"][0]["attributes"];
+    for (name, want) in [("NORMAL", &normals[..]), ("TANGENT", &tangents), ("WEIGHTS_0", &weights)] {
+        let have = elements(&doc, &bin, p[name].as_u64().unwrap() as usize);
+        assert_eq!(have, f32s(want), "{name}");
+    }
+}
+
+#[test]
 fn colors_and_own_attributes_keep_their_encoding() {
     let mut b = square();
     let c = b.accessor(
@@ -464,7 +485,7 @@ fn textured() -> Scene {
     Scene {
         materials: vec![wood, lamp],
         images: vec![png()],
-        ..Scene::from_mesh(SceneMesh { name: Some("panel".into()), geometry, groups: vec![] })
+        ..Scene::from_mesh(SceneMesh { name: Some("panel".into()), geometry, ..Default::default() })
     }
 }
 

@@ -42,7 +42,7 @@ fn round_trip(scene: &Scene) -> Decoded {
 }
 
 fn scene(geometry: MeshInput) -> Scene {
-    Scene::from_mesh(SceneMesh { name: None, geometry, groups: vec![] })
+    Scene::from_mesh(SceneMesh { geometry, ..Default::default() })
 }
 
 proptest! {
@@ -72,7 +72,7 @@ proptest! {
         let or_none = |k: u32| if k == 3 { NONE } else { k };
         input.face_group = picks.iter().map(|p| or_none(p.0)).collect();
         input.face_material = picks.iter().map(|p| or_none(p.1)).collect();
-        let mut s = Scene::from_mesh(SceneMesh { name: None, geometry: input, groups });
+        let mut s = Scene::from_mesh(SceneMesh { name: None, geometry: input, groups, ..Default::default() });
         s.materials = (0..3).map(|k| Material { name: format!("{}{k}", names[k]), ..Default::default() }).collect();
         let d = round_trip(&s);
         let (a, b) = (&s.meshes[0], &d.scene.meshes[0]);

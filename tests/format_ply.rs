@@ -28,7 +28,7 @@ fn write(scene: &Scene, text: bool) -> Encoded {
 }
 
 fn scene(geometry: MeshInput) -> Scene {
-    Scene::from_mesh(SceneMesh { name: None, geometry, groups: vec![] })
+    Scene::from_mesh(SceneMesh { geometry, ..Default::default() })
 }
 
 /// A text file: the header's element lines, and the data.
@@ -101,7 +101,12 @@ fn a_text_file_with_everything() {
     );
     let quality = w.channel(&Semantic::Custom("quality".into())).unwrap();
     assert_eq!((w.get(w.corner[0], quality), w.get(w.corner[2], quality)), (Some(&[0.5][..]), None));
-    for part in ["element camera", "flags", "fewer than three", "none.png", "without a face", "not finite"] {
+    let extras = &d.scene.meshes[0].extras;
+    assert_eq!((extras.of_faces[0].name.as_str(), g.face_row.len()), ("flags", 2));
+    assert!(
+        !extras.loose.vertices.is_empty() && extras.loose.vertices.iter().all(|v| !g.corners.contains(v))
+    );
+    for part in ["element camera", "fewer than three", "none.png", "not finite"] {
         assert!(d.warnings.iter().any(|x| x.contains(part)), "{part}: {:?}", d.warnings);
     }
 }

@@ -30,6 +30,8 @@ pub struct MeshInput {
     pub face_material: Vec<u32>,
     /// Group of every face; empty for none, [`NONE`] for a face without.
     pub face_group: Vec<u32>,
+    /// Row of every face in a table of the caller's, of whatever else it knows about faces; empty for none, [`NONE`] for a face without. Carried along with faces; nothing depends on it.
+    pub face_row: Vec<u32>,
 }
 
 impl MeshInput {
@@ -154,6 +156,7 @@ pub(crate) fn assemble(input: MeshInput) -> Result<Mesh, BuildError> {
         wedges: input.wedges,
         face_material: input.face_material,
         face_group: input.face_group,
+        face_row: input.face_row,
     })
 }
 
@@ -207,6 +210,7 @@ fn validate(input: &MeshInput) -> Result<(), BuildError> {
     let parallel = [
         ("face_material", input.face_material.len(), faces),
         ("face_group", input.face_group.len(), faces),
+        ("face_row", input.face_row.len(), faces),
         ("wedges.corner", input.wedges.as_ref().map_or(0, |w| w.corner.len()), input.corners.len()),
     ];
     for (name, len, want) in parallel {
@@ -316,7 +320,7 @@ fn clean_faces(input: &mut MeshInput, report: &mut BuildReport) {
     if let Some(w) = &mut input.wedges {
         w.corner = wedge;
     }
-    for per_face in [&mut input.face_material, &mut input.face_group] {
+    for per_face in [&mut input.face_material, &mut input.face_group, &mut input.face_row] {
         if !per_face.is_empty() {
             *per_face = map.iter().map(|&f| per_face[f as usize]).collect();
         }

@@ -224,6 +224,7 @@ impl Mesh {
             ),
             ("face materials", self.face_material.len(), t.face_slots(), self.face_material.is_empty()),
             ("face groups", self.face_group.len(), t.face_slots(), self.face_group.is_empty()),
+            ("face rows", self.face_row.len(), t.face_slots(), self.face_row.is_empty()),
         ];
         for (array, len, want, absent) in lengths {
             if len != want && !absent {

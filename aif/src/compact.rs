@@ -60,6 +60,7 @@ impl Mesh {
             wedges,
             face_material: gather(&self.face_material, &kept_faces),
             face_group: gather(&self.face_group, &kept_faces),
+            face_row: gather(&self.face_row, &kept_faces),
         };
         (mesh, maps)
     }
@@ -105,6 +106,7 @@ impl Mesh {
             wedges: self.wedges.as_ref().map(|w| by_first_use(w, slots, total)),
             face_material: gather(&self.face_material, &faces),
             face_group: gather(&self.face_group, &faces),
+            face_row: gather(&self.face_row, &faces),
         };
         (input, vertex)
     }

@@ -17,6 +17,7 @@ pub struct Mesh {
     pub(crate) wedges: Option<Wedges>,
     pub(crate) face_material: Vec<u32>,
     pub(crate) face_group: Vec<u32>,
+    pub(crate) face_row: Vec<u32>,
 }
 
 impl Mesh {
@@ -82,6 +83,11 @@ impl Mesh {
     /// Groups of all face slots; empty when no face has one.
     pub fn face_groups(&self) -> &[u32] {
         &self.face_group
+    }
+
+    /// Rows of all face slots ([`crate::MeshInput::face_row`]); empty when no face has one.
+    pub fn face_rows(&self) -> &[u32] {
+        &self.face_row
     }
 
     /// Number of live vertices.

@@ -87,6 +87,7 @@ impl Mesh {
             wires: wires.map(|e| t.edge_vertices(e).map(|v| v.0)).collect(),
             face_material: per_face(&self.face_material),
             face_group: per_face(&self.face_group),
+            face_row: per_face(&self.face_row),
             positions: self.positions,
             wedges: self.wedges.map(|mut w| {
                 w.corner = wedge.unwrap_or_default();

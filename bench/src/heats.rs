@@ -73,7 +73,7 @@ fn of_mesh(mesh: &str, original: &Raw) -> Result<Vec<Heat>> {
 fn scene(mesh: &Raw) -> Scene {
     let positions = progmesh::aif::Positions::from_f64(mesh.points.clone());
     let geometry = MeshInput::triangles(positions, &mesh.triangles);
-    Scene::from_mesh(SceneMesh { name: None, geometry, groups: vec![] })
+    Scene::from_mesh(SceneMesh { geometry, ..Default::default() })
 }
 
 #[cfg(test)]

@@ -340,6 +340,68 @@ fn flip(bytes: &[u8]) {
 }
 
 #[test]
+fn a_damaged_chunk_takes_only_what_needs_it() {
+    victims().iter().for_each(|v| use_what_is_whole(v));
+}
+
+fn use_what_is_whole(bytes: &[u8]) {
+    let directory = RangeReader::new(bytes).unwrap().directory().clone();
+    let whole = decode(bytes).unwrap();
+    assert!(whole.report.lost.is_empty() && whole.meshes[2].bounds.is_some());
+    for c in &directory.chunks {
+        let mut bad = bytes.to_vec();
+        bad[(c.offset + c.stored / 2) as usize] ^= 4;
+        let d = decode_prefix(&bad).unwrap();
+        let named = |e: &FormatError| matches!(e, FormatError::Chunk { index, .. } if *index == c.index);
+        assert!(d.report.damage.as_ref().is_some_and(named), "{:?}", d.report.damage);
+        assert_eq!(d.report.lost.first().map(|l| l.index), Some(c.index));
+        assert!(d.report.lost.iter().all(|l| l.mesh == c.mesh), "{:?}", d.report.lost);
+        let mut want = whole.clone();
+        let of_mesh = want.meshes.get_mut(c.mesh as usize);
+        match (c.kind, of_mesh) {
+            (ChunkType::BASE, Some(mesh)) => *mesh = ProgressiveMesh::default(),
+            (ChunkType::BOUNDS, Some(mesh)) => mesh.bounds = None,
+            (ChunkType::SCENE, _) => want.scene = None,
+            (ChunkType::ORDER, Some(_)) => {
+                let have = &d.meshes[c.mesh as usize];
+                assert!(have.order.is_none());
+                let faces = |pm: &ProgressiveMesh| full(pm).corners.len();
+                assert_eq!(have.splits.vertex, whole.meshes[c.mesh as usize].splits.vertex);
+                want.meshes[c.mesh as usize] = have.clone();
+                // (Polygons come as triangles.)
+                assert!(c.mesh == 1 || faces(have) == faces(&whole.meshes[c.mesh as usize]));
+            }
+            (_, Some(_)) => {
+                let have = &d.meshes[c.mesh as usize];
+                assert_eq!(have.splits.len(), c.first as usize);
+                assert_eq!(have.base_faces, whole.meshes[c.mesh as usize].base_faces);
+                want.meshes[c.mesh as usize] = have.clone();
+            }
+            (kind, None) => panic!("{kind}"),
+        }
+        assert_eq!((&d.meshes, &d.scene), (&want.meshes, &want.scene), "{}", c.kind);
+        assert!(
+            !d.report.complete
+                || d.meshes.iter().zip(&whole.meshes).all(|(a, b)| a.splits.len() == b.splits.len())
+        );
+        walk(&d);
+    }
+    // The chunks can be found without the checksum of the directory.
+    for at in [9, 44, 48 + 32] {
+        let mut bad = bytes.to_vec();
+        bad[at] ^= 0x40;
+        if at == 9 {
+            assert!(decode_prefix(&bad).is_err(), "another version");
+            continue;
+        }
+        assert!(matches!(decode(&bad), Err(FormatError::Head(_))));
+        let d = decode_prefix(&bad).unwrap();
+        assert_eq!((&d.meshes, &d.turns, &d.scene), (&whole.meshes, &whole.turns, &whole.scene));
+        assert!(matches!(d.report.damage, Some(FormatError::Head(_))));
+    }
+}
+
+#[test]
 fn chunks_that_change_places_or_come_twice_are_found() {
     victims().iter().for_each(|v| change_places(v));
 }

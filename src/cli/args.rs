@@ -92,7 +92,7 @@ impl ProgressiveInput {
         common::name(&self.input, "standard input")
     }
 
-    /// Reads it; with `salvage`, of a damaged file what comes before the damage.
+    /// Reads it; with `salvage`, of a damaged file all that is whole.
     pub(crate) fn read(&self, salvage: bool, warnings: &mut Warnings) -> Result<ProgressiveScene, Failure> {
         common::read_progressive(&self.input, salvage, warnings)
     }

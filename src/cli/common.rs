@@ -104,7 +104,7 @@ pub(crate) fn read(
     Ok(loaded)
 }
 
-/// Reads a progressive mesh file; with `salvage`, of a damaged one what comes before the damage.
+/// Reads a progressive mesh file; with `salvage`, of a damaged one all that is whole.
 pub(crate) fn read_progressive(
     path: &Path,
     salvage: bool,
@@ -116,7 +116,7 @@ pub(crate) fn read_progressive(
     let read = read.map_err(|e| {
         let advice = match &e {
             DecodeError::Progressive(FormatError::Chunk { .. }) if !salvage => {
-                "; --salvage of `decode` uses what comes before"
+                "; --salvage of `decode` uses all that is whole"
             }
             _ => "",
         };

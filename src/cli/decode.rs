@@ -29,7 +29,7 @@ pub(crate) struct Args {
     output: Output,
     #[command(flatten)]
     detail: DetailArgs,
-    /// Of a damaged or cut-off file use what comes before the damage, instead of nothing
+    /// Of a damaged or cut-off file use all that is whole, instead of nothing
     #[arg(long)]
     salvage: bool,
     /// Threads to use; the result does not depend on it [default: all]

@@ -90,6 +90,11 @@ impl Args {
                 return Err(Failure::Interrupted);
             }
             warnings.say(built.warnings.iter().map(|w| format!("{file}: {w}")));
+            let has_extras = |m: &progmesh::scene::SceneMesh| !m.extras.is_empty();
+            if self.any_order && built.scene.shell.meshes.iter().any(has_extras) {
+                let what = "values of faces, and attributes of vertices without a face,";
+                warnings.say([format!("{file}: {what} are left out with --any-order")]);
+            }
             let mut built = built;
             let measuring = Instant::now();
             if self.bounds || self.paged {

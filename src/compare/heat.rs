@@ -40,7 +40,7 @@ pub fn heat_scene(a: &Flattened, b: &Surface, scale: &Scale, linear: bool) -> Re
     if linear {
         normals::apply(&mut geometry, Normals::Recompute { crease: DEFAULT_CREASE })?;
     }
-    Ok(Scene::from_mesh(SceneMesh { name: Some("distance".into()), geometry, groups: vec![] }))
+    Ok(Scene::from_mesh(SceneMesh { name: Some("distance".into()), geometry, ..Default::default() }))
 }
 
 /// Edges longer than this part of the diagonal are cut whatever the distance does, for it may do something between; shorter than `SHORT`, never.

@@ -1,7 +1,7 @@
 //! Putting a scene into one mesh, for the formats that have no nodes.
 
 use crate::aif::{Channel, MeshInput, NONE, Positions, Semantic, Wedges};
-use crate::scene::{Group, Scene, SceneMesh};
+use crate::scene::{Extras, Group, Scene, SceneMesh};
 use glam::{DMat3, DMat4, DVec3};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -12,6 +12,8 @@ pub(crate) struct Flat<'a> {
     pub(crate) geometry: Cow<'a, MeshInput>,
     /// What `geometry.face_group` indexes. With several instances every face has a group, whose object names the instance.
     pub(crate) groups: Cow<'a, [Group]>,
+    /// What else is known of its faces and vertices; nothing with several instances.
+    pub(crate) extras: Cow<'a, Extras>,
     /// The name of the only instance.
     pub(crate) name: Option<&'a str>,
     /// What was lost, for the format called by the name given.
@@ -78,13 +80,15 @@ fn place<'a>(scene: &'a Scene, format: &str) -> Flat<'a> {
         return Flat {
             geometry: Cow::Borrowed(&only.mesh.geometry),
             groups: Cow::Borrowed(&only.mesh.groups),
+            extras: Cow::Borrowed(&only.mesh.extras),
             name: only.name,
             warnings,
         };
     }
     let name = if let [only] = &instances[..] { only.name } else { None };
     let (geometry, groups) = merge(&instances);
-    Flat { geometry: Cow::Owned(geometry), groups: Cow::Owned(groups), name, warnings }
+    let extras = Cow::Owned(one_extras(&instances));
+    Flat { geometry: Cow::Owned(geometry), groups: Cow::Owned(groups), extras, name, warnings }
 }
 
 fn instances<'a>(scene: &'a Scene) -> Vec<Instance<'a>> {
@@ -261,6 +265,9 @@ fn merge(instances: &[Instance<'_>]) -> (MeshInput, Vec<Group>) {
     if out.face_group.iter().all(|&g| g == NONE) {
         out.face_group.clear();
     }
+    if let [only] = instances {
+        out.face_row.clone_from(&only.mesh.geometry.face_row);
+    }
     out.wedges = wedges;
     out.positions = if single {
         Positions::F32(points.iter().map(|p| p.map(|x| x as f32)).collect())
@@ -268,6 +275,14 @@ fn merge(instances: &[Instance<'_>]) -> (MeshInput, Vec<Group>) {
         Positions::from_f64(points)
     };
     (out, groups)
+}
+
+/// The extras of the mesh that [`merge`] makes. (Normals of vertices without a face would have to be turned.)
+fn one_extras(instances: &[Instance<'_>]) -> Extras {
+    match instances {
+        [only] => Extras { of_faces: only.mesh.extras.of_faces.clone(), ..Default::default() },
+        _ => Extras::default(),
+    }
 }
 
 /// Where the vertices of [`flatten`]'s mesh are from: each instance's, one after the other, as the mesh and the number of its vertices.
@@ -347,7 +362,7 @@ mod tests {
         wedges.push(&[0.6, 0.0, 0.8], 1);
         wedges.corner = vec![0; 3];
         geometry.wedges = Some(wedges);
-        SceneMesh { name: Some("t".into()), geometry, groups: vec![] }
+        SceneMesh { name: Some("t".into()), geometry, ..Default::default() }
     }
 
     fn node(transform: DMat4) -> Node {

@@ -212,7 +212,7 @@ pub fn decode(format: Format, bytes: &[u8], side: &dyn Side) -> Result<Decoded, 
 
 /// Encodes a scene. Texture coordinates are turned over where the format's run the other way than the scene's.
 pub fn encode(format: Format, scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeError> {
-    match format {
+    let mut encoded = match format {
         Format::Obj => obj::encode(scene, options),
         Format::Gltf | Format::Glb => gltf::encode(scene, format, options),
         Format::Ply => ply::encode(scene, options),
@@ -222,5 +222,33 @@ pub fn encode(format: Format, scene: &Scene, options: &EncodeOptions) -> Result<
             let what = "a mesh without splits; make them first (`encode` does)".into();
             Err(EncodeError::CannotHold { format, what })
         }
+    }?;
+    let one = scene.instance_counts().iter().sum::<usize>() == 1;
+    if format != Format::Ply || !one {
+        encoded.warnings.extend(lost_extras(scene, format));
     }
+    Ok(encoded)
+}
+
+/// What only a PLY file of one mesh holds, if the scene has such.
+fn lost_extras(scene: &Scene, format: Format) -> Vec<String> {
+    let used = |m: &&crate::scene::SceneMesh| !m.geometry.face_row.is_empty();
+    let names: std::collections::BTreeSet<&str> = scene
+        .meshes
+        .iter()
+        .filter(used)
+        .flat_map(|m| m.extras.of_faces.iter().map(|v| v.name.as_str()))
+        .collect();
+    let loose: usize = scene.meshes.iter().map(|m| m.extras.loose.vertices.len()).sum();
+    let mut said = Vec::new();
+    if !names.is_empty() {
+        let names: Vec<&str> = names.into_iter().collect();
+        said.push(format!(
+            "the values of faces {} are left out: {} cannot hold them",
+            names.join(", "),
+            format.extension()
+        ));
+    }
+    said.extend(crate::pipeline::left_loose(loose));
+    said
 }

@@ -5,7 +5,7 @@ use crate::aif::{BuildOptions, Mesh, MeshInput, Weld};
 use crate::normals::{self, Normals};
 use crate::progressive::{Leftover, ProgressiveScene, shell_of};
 use crate::refine::progressive::{EncodeError, build_all};
-use crate::scene::Scene;
+use crate::scene::{Extras, Scene};
 use crate::simplify::{Control, Stop};
 use std::time::Instant;
 
@@ -47,6 +47,9 @@ pub fn build_progressive(scene: Scene, job: &Job, control: &dyn Control) -> Resu
     for i in 0..scene.meshes.len() {
         let label = label(&scene, i);
         let mut input = std::mem::take(&mut scene.meshes[i].geometry);
+        let extras = std::mem::take(&mut scene.meshes[i].extras);
+        scene.meshes[i].extras =
+            if job.weld == Weld::No { extras.by_face(&input) } else { Extras::default() };
         let failed = |source| JobError::Build { mesh: label.clone(), source };
         if job.normals != Normals::Keep {
             input.validate().map_err(failed)?;

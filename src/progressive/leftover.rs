@@ -102,6 +102,25 @@ impl Leftover {
         out
     }
 
+    /// The input's faces that those of these numbers, without the leftovers, were made of. O(n).
+    pub(crate) fn numbers(&self, faces: Vec<u32>) -> Vec<u32> {
+        let most = faces.iter().copied().max().map_or(0, |f| f as usize + 1);
+        let (mut of, mut own) = (Vec::with_capacity(most), 0);
+        for f in 0u32.. {
+            if of.len() >= most {
+                break;
+            }
+            let made = if self.faces.get(own) == Some(&f) {
+                own += 1;
+                self.mended.get(own - 1).copied().unwrap_or(0) as usize
+            } else {
+                1
+            };
+            of.extend(std::iter::repeat_n(f, made.min(most - of.len())));
+        }
+        faces.into_iter().map(|f| of[f as usize]).collect()
+    }
+
     /// True if there is none.
     pub fn is_empty(&self) -> bool {
         self.faces.is_empty()

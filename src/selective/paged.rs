@@ -283,7 +283,7 @@ impl PagedScene {
             if groups > 0 {
                 geometry.face_group.iter_mut().filter(|g| **g >= groups).for_each(|g| *g = NONE);
             }
-            mesh.geometry = geometry;
+            mesh.stand(geometry, None, false);
         }
         scene
     }

@@ -181,10 +181,13 @@ pub(super) fn scene_of<W: Whole>(shell: &Scene, leftovers: &[Leftover], all: &[W
     let full = all.iter().all(W::is_full);
     for (i, shown) in all.iter().enumerate() {
         let geometry = shown.to_input();
-        scene.meshes[i].geometry = match leftovers.get(i).filter(|_| full && shown.has_order()) {
+        let whole = full && shown.has_order();
+        let geometry = match leftovers.get(i).filter(|_| whole) {
             Some(left) => left.put_back(geometry),
             None => geometry,
         };
+        let faces = whole.then(|| (0..geometry.face_count() as u32).collect());
+        scene.meshes[i].stand(geometry, faces, whole);
     }
     scene
 }

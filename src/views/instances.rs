@@ -1,7 +1,7 @@
 //! Every instance of a mesh on its own.
 
 use crate::aif::MeshInput;
-use crate::scene::{Scene, SceneMesh};
+use crate::scene::{LooseRows, Scene, SceneMesh};
 use glam::DMat4;
 use rustc_hash::FxHashMap;
 
@@ -29,7 +29,9 @@ pub(super) fn each<E>(
                 Fate::Keep => kept.push(std::mem::take(&mut scene.meshes[m])),
                 Fate::Drop => {}
                 Fate::Replace(geometry) => {
-                    kept.push(SceneMesh { geometry: *geometry, ..std::mem::take(&mut scene.meshes[m]) });
+                    let mut mesh = SceneMesh { geometry: *geometry, ..std::mem::take(&mut scene.meshes[m]) };
+                    mesh.extras.loose = LooseRows::default();
+                    kept.push(mesh);
                 }
             }
         }
@@ -69,14 +71,17 @@ pub(super) fn each<E>(
             Some(Fate::Keep) => Some(*m),
             Some(Fate::Replace(geometry)) => Some(if std::mem::replace(&mut taken[*m], true) {
                 let old = &scene.meshes[*m];
-                let (name, groups) = (old.name.clone(), old.groups.clone());
-                scene.meshes.push(SceneMesh { name, groups, geometry: *geometry });
+                let mut mesh = SceneMesh { geometry: *geometry, ..Default::default() };
+                (mesh.name, mesh.groups) = (old.name.clone(), old.groups.clone());
+                mesh.extras.of_faces = old.extras.of_faces.clone();
+                scene.meshes.push(mesh);
                 if let Some(source) = &mut scene.gltf {
                     source.copy_mesh(*m);
                 }
                 scene.meshes.len() - 1
             } else {
                 scene.meshes[*m].geometry = *geometry;
+                scene.meshes[*m].extras.loose = LooseRows::default();
                 *m
             }),
             Some(Fate::Drop) | None => None,

@@ -203,6 +203,10 @@ fn parallel_arrays() {
         CheckError::Length { array: "face groups", len: 3, want: 2 }
     );
     assert_eq!(
+        broken(square(), |m| m.face_row = vec![0; 3]),
+        CheckError::Length { array: "face rows", len: 3, want: 2 }
+    );
+    assert_eq!(
         broken(square(), |m| m.positions = vec![[0.0f32; 3]; 4].into()),
         CheckError::Length { array: "positions", len: 4, want: 5 }
     );

@@ -17,6 +17,7 @@ pub struct Assembly {
     meshes: Vec<Option<Part>>,
     turns: Vec<u32>,
     pub(super) scene: Option<Vec<u8>>,
+    extras: Vec<(u32, Vec<u8>)>,
 }
 
 #[derive(Clone, Debug)]
@@ -51,6 +52,9 @@ impl Part {
     fn sequel(&mut self, chunk: &Chunk, bytes: &[u8]) -> Option<SplitBlock> {
         if self.sequel.is_none() && !self.mesh.splits.is_empty() {
             // Splits that were read alone came before.
+            return None;
+        }
+        if chunk.first_face as usize != self.faces || chunk.first as usize != self.mesh.splits.len() {
             return None;
         }
         let state = match &mut self.sequel {
@@ -151,6 +155,12 @@ impl Assembly {
                 input_order::turn(&mut part.mesh, &tips, false);
             }
             (Piece::Scene(bytes), _) if self.scene.is_none() => self.scene = Some(bytes),
+            (Piece::Other(bytes), Some(_)) if chunk.kind == ChunkType::EXTRAS => {
+                if self.extras.iter().any(|e| e.0 == chunk.mesh) {
+                    return Err(chunk.damage("it does not follow what came before"));
+                }
+                self.extras.push((chunk.mesh, bytes));
+            }
             (Piece::Other(_), _) => {}
             _ => return Err(chunk.damage("it does not follow what came before")),
         }
@@ -162,7 +172,15 @@ impl Assembly {
         let mut report = Report { complete: damage.is_none(), ..Default::default() };
         report.streams.head = directory.bytes();
         let mut meshes = Vec::new();
-        for part in self.meshes.into_iter().flatten() {
+        for part in self.meshes {
+            let Some(part) = part else {
+                // So that the others keep their numbers.
+                meshes.push(ProgressiveMesh::default());
+                report.quantisation_errors.push(0.0);
+                report.flat_faces.push(0);
+                report.complete = false;
+                continue;
+            };
             let mut pm = part.mesh;
             let n = pm.splits.len() as u32;
             pm.bounds = part.bounds.filter(|b| b.len() == n as usize).map(Arc::new);
@@ -173,7 +191,7 @@ impl Assembly {
             meshes.push(pm);
         }
         report.damage = damage;
-        Decoded { meshes, turns: self.turns, scene: self.scene, report }
+        Decoded { meshes, turns: self.turns, scene: self.scene, extras: self.extras, report }
     }
 }
 
@@ -181,12 +199,14 @@ impl Assembly {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Decoded {
-    /// The meshes. Of a damaged or cut off file, as much of them as came before the damage.
+    /// The meshes. Of a damaged or cut off file, as much of them as is whole; empty ones in place of those without a base.
     pub meshes: Vec<ProgressiveMesh>,
     /// The mesh whose next split comes, coarsest first.
     pub turns: Vec<u32>,
     /// The scene, as it was given to [`super::encode`].
     pub scene: Option<Vec<u8>>,
+    /// Meshes and their chunks of [`ChunkType::EXTRAS`], as they were given to [`super::encode`].
+    pub extras: Vec<(u32, Vec<u8>)>,
     /// Sizes and losses.
     pub report: Report,
 }
@@ -197,8 +217,10 @@ pub struct Decoded {
 pub struct Report {
     /// Every split of every mesh was there.
     pub complete: bool,
-    /// What ended the reading before the end of the file.
+    /// The first damage.
     pub damage: Option<FormatError>,
+    /// Chunks that were not used, in the order of the file: damaged, not there, or of no use without others that are.
+    pub lost: Vec<Chunk>,
     /// By mesh: how far quantising moved a vertex at most, model units; 0 for none.
     pub quantisation_errors: Vec<f64>,
     /// By mesh: faces at full detail of which quantising put two corners at one place.

@@ -37,6 +37,8 @@ impl ChunkType {
     pub const SCENE: ChunkType = ChunkType(*b"SCNE");
     /// Bounds of splits for view-dependent refinement.
     pub const BOUNDS: ChunkType = ChunkType(*b"BNDS");
+    /// What a mesh's elements have beside, of use at full detail; opaque here.
+    pub const EXTRAS: ChunkType = ChunkType(*b"XTRA");
     /// What a mesh is of a height grid.
     pub const TERRAIN: ChunkType = ChunkType(*b"TERR");
 }
@@ -280,12 +282,28 @@ impl Directory {
 
     /// Reads head and directory, which `bytes` are.
     pub(super) fn read(bytes: &[u8]) -> Result<Directory, FormatError> {
+        match Self::salvage(bytes)? {
+            (directory, None) => Ok(directory),
+            (_, Some(damage)) => Err(damage),
+        }
+    }
+
+    /// The same with a wrong checksum, which is returned beside it, as long as chunks stand side by side and go together: they have checksums of their own.
+    pub(super) fn salvage(bytes: &[u8]) -> Result<(Directory, Option<FormatError>), FormatError> {
         if bytes.len() < Self::length(bytes)? {
             return Err(FormatError::Head("the file ends within the directory"));
         }
-        if head_checksum(bytes) != u32_at(bytes, HEAD - 4) {
-            return Err(FormatError::Head("its checksum is another"));
+        if head_checksum(bytes) == u32_at(bytes, HEAD - 4) {
+            return Ok((Self::parse(bytes)?, None));
         }
+        let damage = FormatError::Head("its checksum is another");
+        match Self::parse(bytes) {
+            Ok(directory) => Ok((directory, Some(damage))),
+            Err(_) => Err(damage),
+        }
+    }
+
+    fn parse(bytes: &[u8]) -> Result<Directory, FormatError> {
         let entries = bytes[HEAD..].chunks_exact(ENTRY).zip(0..);
         let directory = Directory {
             meshes: u32_at(bytes, 20),

@@ -73,23 +73,26 @@ pub fn decode(bytes: &[u8]) -> Result<Decoded, FormatError> {
     }
 }
 
-/// Reads as much of a file as is there and undamaged; [`super::Report::damage`] says why it ended early, if it did.
+/// Reads of a file all that is whole: every chunk that is undamaged, as are those it builds on. What a damaged chunk holds, and what needs it, is left out:
+/// with a base the mesh (an empty one stands in its place), with splits all later ones of that mesh, with the scene nothing else. Of a file that is cut off, that is all that came before.
+/// [`super::Report::damage`] is the first damage, [`super::Report::lost`] lists the chunks that were left out.
 ///
-/// Errors: damage of head or directory.
+/// Errors: damage of the head or the directory by which chunks cannot be found.
 pub fn decode_prefix(bytes: &[u8]) -> Result<Decoded, FormatError> {
     let length = Directory::length(&bytes[..bytes.len().min(HEAD)])?;
-    let directory = Directory::read(&bytes[..bytes.len().min(length)])?;
+    let (directory, mut damage) = Directory::salvage(&bytes[..bytes.len().min(length)])?;
     let mut assembly = Assembly::new(&directory);
     let mut sizes = StreamSizes::default();
-    let mut damage = None;
     let slice = |c: &Chunk| {
         let end = c.range().end.min(bytes.len() as u64) as usize;
         &bytes[(c.offset as usize).min(end)..end]
     };
     // Bases first, as every other chunk needs them; then all others by themselves; then all together.
     let (bases, others): (Vec<&Chunk>, _) = directory.chunks.iter().partition(|c| c.kind == ChunkType::BASE);
-    let mut failed_at = u32::MAX;
+    let mut failed_at = if damage.is_some() { 0 } else { u32::MAX };
+    let mut lost = Vec::new();
     let mut note = |chunk: &Chunk, e: FormatError| {
+        lost.push(*chunk);
         if chunk.index < failed_at {
             failed_at = chunk.index;
             damage = Some(e);
@@ -108,18 +111,18 @@ pub fn decode_prefix(bytes: &[u8]) -> Result<Decoded, FormatError> {
         _ => None,
     }));
     for (chunk, piece) in pieces {
+        // What follows from damage before has a later place, so the first is what is told.
         match piece.and_then(|p| assembly.add(chunk, p)) {
             Ok(()) => sizes.add(chunk, slice(chunk)),
-            Err(e) => {
-                note(chunk, e);
-                break;
-            }
+            Err(e) => note(chunk, e),
         }
     }
     if damage.is_none() && bytes.len() as u64 > directory.file_bytes() {
         damage = Some(FormatError::Head("the file is longer than it says"));
     }
+    lost.sort_unstable_by_key(|c| c.index);
     let mut decoded = assembly.finish(&directory, damage);
+    decoded.report.lost = lost;
     sizes.head = directory.bytes();
     decoded.report.streams = sizes;
     Ok(decoded)
@@ -200,8 +203,10 @@ impl<R: Read> PmReader<R> {
 
     /// What was read so far.
     pub fn finish(self) -> Decoded {
-        let complete = self.next == self.directory.chunks.len();
+        let lost = self.directory.chunks.get(self.next..).unwrap_or_default();
+        let complete = lost.is_empty();
         let mut decoded = self.assembly.finish(&self.directory, self.damage);
+        decoded.report.lost = lost.to_vec();
         decoded.report.complete &= complete;
         decoded.report.streams = self.sizes;
         decoded

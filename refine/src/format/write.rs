@@ -30,7 +30,7 @@ pub struct EncodeOptions {
     /// Splits of a chunk, at most but for those of a single vertex and the few that others need; by default 16,384, and 8,192 of chunks that follow each other. With smaller ones less has to be fetched for a region,
     /// and more in all.
     pub chunk: Option<u32>,
-    /// Chunks of other kinds, which readers may skip: what they are, of which mesh (`u32::MAX` for none), and what they hold.
+    /// Chunks of other kinds, which readers may skip: what they are, of which mesh (`u32::MAX` for none), and what they hold. They stand before all splits; [`ChunkType::EXTRAS`] behind all else.
     pub others: Vec<(ChunkType, u32, Vec<u8>)>,
 }
 
@@ -175,15 +175,16 @@ pub fn encode(
     if !scene.is_empty() {
         all.push(part(ChunkType::SCENE, false, u32::MAX, scene.len() as u64, scene.to_vec()));
     }
-    // They may tell what to do with the splits.
-    all.extend(
-        options
-            .others
-            .iter()
-            .map(|(kind, m, bytes)| part(*kind, false, *m, bytes.len() as u64, bytes.clone())),
-    );
+    let others = options
+        .others
+        .iter()
+        .map(|(kind, m, bytes)| part(*kind, false, *m, bytes.len() as u64, bytes.clone()));
+    let (extras, others): (Vec<Part>, Vec<Part>) = others.partition(|p| p.chunk.kind == ChunkType::EXTRAS);
+    // They may tell what to do with the splits; extras are for the end.
+    all.extend(others);
     all.extend(interleave(chunks));
     all.extend(orders);
+    all.extend(extras);
     let mut directory =
         Directory { meshes: meshes.len() as u32, chunks: all.iter().map(|p| p.chunk).collect() };
     let mut out = directory.write();

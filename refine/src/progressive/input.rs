@@ -171,6 +171,25 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
         out
     }
 
+    /// The input's face of every face of [`Cursor::to_ordered_input`], ascending: at full detail their numbers, elsewhere of every triangle the face it was, or was cut from. `None` without
+    /// [`ProgressiveMesh::order`]. O(n log n).
+    pub fn input_faces(&self) -> Option<Vec<u32>> {
+        let order = self.source().order.as_ref()?;
+        let mut faces: Vec<u32> = order.face.get(..self.face_count())?.to_vec();
+        faces.sort_unstable();
+        let Some(p) = &order.polygons else { return Some(faces) };
+        if self.position() == self.source().splits.len() {
+            return Some((0..p.sizes.len() as u32).collect());
+        }
+        // A polygon of n corners was cut into n - 2 triangles, which follow each other.
+        let mut of = Vec::with_capacity(order.face.len());
+        for (k, &n) in (0u32..).zip(&p.sizes) {
+            let room = order.face.len() - of.len();
+            of.extend(std::iter::repeat_n(k, (n.saturating_sub(2) as usize).min(room)));
+        }
+        faces.iter().map(|&f| of.get(f as usize).copied()).collect()
+    }
+
     /// The wedges of the input; `have` holds those of full detail, by slot.
     fn input_wedges(&self, order: &InputOrder, have: &Wedges) -> Option<Wedges> {
         let slots: Vec<u32> = order.corner_slots().map(|(f, k)| self.indices()[f][k]).collect();

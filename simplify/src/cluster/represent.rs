@@ -37,6 +37,7 @@ impl Source<'_> {
         };
         let mesh = &*self.work.mesh;
         let (material, group) = (per_face(mesh.face_materials()), per_face(mesh.face_groups()));
+        let face_row = per_face(mesh.face_rows());
         let mut corners = triangles.into_flattened();
         let mut wires = wires;
         let mut origin = Vec::new();
@@ -66,6 +67,7 @@ impl Source<'_> {
             wedges,
             face_material: material,
             face_group: group,
+            face_row,
             ..MeshInput::default()
         };
         // Indices are in range, places finite, arrays parallel: this builds.

@@ -37,7 +37,7 @@ pub(crate) fn input_of(s: &Sample) -> MeshInput {
         wires: s.wires.clone(),
         wedges,
         face_material: s.face_material.clone(),
-        face_group: Vec::new(),
+        ..Default::default()
     }
 }
 

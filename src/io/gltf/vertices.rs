@@ -73,7 +73,7 @@ pub(super) fn mesh(
         what: format!("a mesh with {n} attributes ({}; at most 64)", at.path),
     })?;
     let geometry = Reader::new(channels, store, notes)?.read(&primitives)?;
-    Ok(SceneMesh { name: at.name(), geometry, groups })
+    Ok(SceneMesh { name: at.name(), geometry, groups, ..Default::default() })
 }
 
 fn primitive<'a>(

@@ -425,10 +425,12 @@ impl Reader {
             wedges,
             face_material: self.face_material,
             face_group: self.face_group,
+            ..Default::default()
         };
         let object = self.groups.first().and_then(|g| g.object.clone());
         let name = object.filter(|o| self.groups.iter().all(|g| g.object.as_deref() == Some(o)));
-        let mut scene = Scene::from_mesh(SceneMesh { name, geometry, groups: self.groups });
+        let mut scene =
+            Scene::from_mesh(SceneMesh { name, geometry, groups: self.groups, ..Default::default() });
         scene.materials = self.library.materials;
         scene.images = self.library.images;
         Ok(Decoded { scene, warnings })

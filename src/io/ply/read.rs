@@ -6,14 +6,14 @@ use crate::aif::{Bits, Channel, Encoding, MeshInput, NONE, Semantic, Wedges};
 use crate::io::obj::mime_of;
 use crate::io::text::{Cursor, Number, PointsReader, line_error};
 use crate::io::{DecodeError, Decoded, Side};
-use crate::scene::{Image, Material, Scene, SceneMesh};
+use crate::scene::{Extras, FaceValues, Image, LooseRows, Material, Scene, SceneMesh};
 use rustc_hash::FxHashMap;
 
 /// Decodes a PLY file into one mesh. Textures it names are asked of `side`; one that is missing is a warning.
 ///
 /// Positions declared `float` are f32; `double` is kept as f64 where f32 would lose. Every vertex with attributes has one wedge, unless
-/// faces have colours or texture coordinates of their own. Faces of fewer than three corners are left out with a warning, as are
-/// elements and properties that a mesh cannot hold. Errors name the element, and the line in a text file. Allocates in proportion
+/// faces have colours or texture coordinates of their own. Other numbers of faces, and attributes of vertices without a face, are kept beside the mesh ([`Extras`]). Faces of fewer than
+/// three corners are left out with a warning, as are elements and lists that a mesh cannot hold. Errors name the element, and the line in a text file. Allocates in proportion
 /// to the data that are there, whatever the header announces.
 pub fn decode(bytes: &[u8], side: &dyn Side) -> Result<Decoded, DecodeError> {
     let header = Header::parse(bytes)?;
@@ -173,6 +173,10 @@ struct Reader<'h, S> {
     wires: Vec<[u32; 2]>,
     face: FaceAttributes,
     texture_number: Vec<u32>,
+    /// Other numbers of faces, and which of them each face has; empty as long as there are none.
+    face_values: Vec<FaceValues>,
+    face_row: Vec<u32>,
+    loose: LooseRows,
     warnings: Vec<String>,
 }
 
@@ -197,6 +201,9 @@ impl<'h, S: Source> Reader<'h, S> {
             wires: Vec::new(),
             face: FaceAttributes::default(),
             texture_number: Vec::new(),
+            face_values: Vec::new(),
+            face_row: Vec::new(),
+            loose: LooseRows::default(),
             warnings: Vec::new(),
         })
     }
@@ -404,9 +411,8 @@ impl<'h, S: Source> Reader<'h, S> {
         self.face.texture = element.list(&["texcoord"]);
         let number = element.scalar("texnumber").map(|(i, _)| i);
         if let Some(list) = color_properties(element) {
-            if self.channels.iter().any(|c| c.semantic == Semantic::Color(0)) {
-                self.warnings.push("colours of faces are left out, since vertices have colours".into());
-            } else {
+            // Where vertices have colours, too, these are numbers like others.
+            if !self.channels.iter().any(|c| c.semantic == Semantic::Color(0)) {
                 self.face.encoding = list[0].1.color().0;
                 self.face.color = list.iter().map(|&(i, t)| (i, t.color().1)).collect();
             }
@@ -417,13 +423,27 @@ impl<'h, S: Source> Reader<'h, S> {
                 || Some(i) == number
                 || self.face.color.iter().any(|c| c.0 == i)
         };
-        let others: Vec<&str> = (0..element.properties.len())
-            .filter(|&i| !known(i))
-            .map(|i| element.properties[i].name.as_str())
-            .collect();
-        if !others.is_empty() {
-            self.warnings.push(format!("properties of faces are left out: {}", some_of(&others)));
+        // The column of each property that is a number like others.
+        let mut column = vec![NONE; element.properties.len()];
+        let mut others = Vec::new();
+        let again = !self.face_values.is_empty();
+        for (i, p) in element.properties.iter().enumerate().filter(|&(i, _)| !known(i)) {
+            match p.kind {
+                Kind::One(t) if !again && self.face_values.iter().all(|v| v.name != p.name) => {
+                    column[i] = self.face_values.len() as u32;
+                    let encoding = t.encoding();
+                    self.face_values.push(FaceValues { name: p.name.clone(), encoding, values: vec![] });
+                }
+                _ => others.push(p.name.as_str()),
+            }
         }
+        if !others.is_empty() {
+            self.warnings.push(format!(
+                "lists of faces other than their vertices and texture coordinates, and properties of a name again, are left out: {}",
+                some_of(&others)
+            ));
+        }
+        let valued = !again && !self.face_values.is_empty();
         // Most files are triangles with a byte for the count.
         let room = (element.count as usize).saturating_mul(3).min(self.source.left());
         self.corners.reserve(room);
@@ -431,6 +451,8 @@ impl<'h, S: Source> Reader<'h, S> {
         // Corners and faces of elements before this one have nothing of their own.
         self.face.rows.resize(self.corners.len() * self.face.stride(), f32::NAN);
         self.texture_number.resize(if number.is_some() { self.faces } else { 0 }, 0);
+        self.face_row.resize(if valued { self.faces } else { self.face_row.len() }, NONE);
+        let mut row = vec![0.0; if valued { self.face_values.len() } else { 0 }];
         let (mut short, mut odd) = (0usize, 0usize);
         let mut texture: Vec<f32> = Vec::new();
         let mut color = [0.0f32; 4];
@@ -460,7 +482,12 @@ impl<'h, S: Source> Reader<'h, S> {
                         Some(c) => {
                             color[c] = (self.number(t, element, i)?.value / self.face.color[c].1) as f32
                         }
-                        None => self.skip_property(p.kind, element, i)?,
+                        None => {
+                            let value = self.number(t, element, i)?.value;
+                            if let Some(to) = row.get_mut(column[k] as usize) {
+                                *to = value;
+                            }
+                        }
                     },
                     kind => self.skip_property(kind, element, i)?,
                 }
@@ -484,6 +511,10 @@ impl<'h, S: Source> Reader<'h, S> {
             }
             if number.is_some() {
                 self.texture_number.push(of_face);
+            }
+            if valued {
+                self.face_row.push(self.face_values[0].values.len() as u32);
+                self.face_values.iter_mut().zip(&row).for_each(|(of, &x)| of.values.push(x));
             }
             self.add_face(n);
         }
@@ -577,6 +608,9 @@ impl<'h, S: Source> Reader<'h, S> {
     fn finish(mut self, side: &dyn Side) -> Result<Decoded, DecodeError> {
         // Faces of several elements: only those of `face` have attributes of their own, and all come in file order.
         let wedges = self.wedges();
+        if !self.face_row.is_empty() {
+            self.face_row.resize(self.faces, NONE);
+        }
         let mut scene = Scene::from_mesh(SceneMesh {
             name: None,
             geometry: MeshInput {
@@ -587,8 +621,10 @@ impl<'h, S: Source> Reader<'h, S> {
                 wedges,
                 face_material: Vec::new(),
                 face_group: Vec::new(),
+                face_row: self.face_row,
             },
             groups: Vec::new(),
+            extras: Extras { of_faces: self.face_values, loose: self.loose },
         });
         for name in &self.header.textures {
             let data = match side.load(name) {
@@ -643,10 +679,11 @@ impl<'h, S: Source> Reader<'h, S> {
         let mut used = Bits::new(self.vertices);
         self.corners.iter().for_each(|&v| used.set(v as usize));
         let isolated = self.points.len().saturating_sub(used.count());
-        if isolated > 0 && own > 0 {
-            self.warnings.push(format!("the attributes of {isolated} vertices without a face are left out"));
-        }
         if self.corners.is_empty() {
+            if isolated > 0 && own > 0 {
+                self.warnings
+                    .push(format!("the attributes of {isolated} vertices without a face are left out"));
+            }
             return None;
         }
         let widths: Vec<usize> = channels.iter().map(|c| c.width).collect();
@@ -692,6 +729,15 @@ impl<'h, S: Source> Reader<'h, S> {
                 bits.iter_mut().zip(face).for_each(|(b, x)| *b = x.to_bits());
                 let id = *seen.entry((v, bits)).or_insert_with(|| push(&mut wedges, of_vertex(v), face));
                 corner.push(id);
+            }
+        }
+        if isolated > 0 && own > 0 {
+            let mut loose = Wedges::new(wedges.channels().to_vec()).ok()?;
+            for v in (0..self.vertices as u32).filter(|&v| !used.get(v as usize)) {
+                let id = push(&mut loose, of_vertex(v), &[]);
+                self.loose.vertices.push(v);
+                self.loose.present.push(loose.present(id));
+                self.loose.rows.extend_from_slice(loose.row(id));
             }
         }
         if lost > 0 {

@@ -5,7 +5,7 @@ use crate::io::flatten::{flatten, has_named_groups};
 use crate::io::obj::image_names;
 use crate::io::text::{f64_mark, write_f32, write_f64, write_f64_long};
 use crate::io::{EncodeError, EncodeOptions, Encoded};
-use crate::scene::Scene;
+use crate::scene::{Extras, Scene};
 use std::io::Write;
 
 /// Encodes a scene as PLY: binary little endian, or text with [`EncodeOptions::text`].
@@ -28,7 +28,7 @@ pub fn encode(scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeE
             encoded.side.push((name.clone(), data));
         }
     }
-    let plan = Plan::new(input, &textures, warnings);
+    let plan = Plan::new(input, &flat.extras, &textures, warnings);
     let out = if options.text { Sink::Text(Vec::new()) } else { Sink::Binary(Vec::new()) };
     // A comment ends with its line.
     let line = |text: String| text.replace(|c: char| c.is_control(), " ");
@@ -142,14 +142,64 @@ struct Plan<'a> {
     /// Written as a list a face.
     texcoord: Option<usize>,
     face_color: Option<Written>,
+    /// Names, types and values of other numbers of faces.
+    face_values: Vec<(String, Type, &'a [f64])>,
+    extras: &'a Extras,
+    /// The row of each vertex without a face.
+    loose: std::collections::HashMap<u32, usize>,
 }
 
 impl<'a> Plan<'a> {
-    fn new(input: &'a MeshInput, textures: &Textures, warnings: &mut Vec<String>) -> Self {
-        let wedges = input.wedges.as_ref();
-        let mut plan =
-            Plan { wedges, corner: Vec::new(), vertex: Vec::new(), texcoord: None, face_color: None };
-        let Some(w) = wedges else { return plan };
+    fn new(
+        input: &'a MeshInput,
+        extras: &'a Extras,
+        textures: &Textures,
+        warnings: &mut Vec<String>,
+    ) -> Self {
+        let mut plan = Plan {
+            wedges: input.wedges.as_ref(),
+            corner: Vec::new(),
+            vertex: Vec::new(),
+            texcoord: None,
+            face_color: None,
+            face_values: Vec::new(),
+            extras,
+            loose: Default::default(),
+        };
+        plan.attributes(input, textures, warnings);
+        plan.values_of_faces(input, textures, warnings);
+        plan
+    }
+
+    /// Numbers of faces that mean nothing here.
+    fn values_of_faces(&mut self, input: &MeshInput, textures: &Textures, warnings: &mut Vec<String>) {
+        if input.face_row.len() != input.face_count() {
+            return;
+        }
+        let mut taken: Vec<String> = self.face_color.iter().flat_map(|w| w.names.clone()).collect();
+        taken.extend(["vertex_indices", "vertex_index", "texcoord"].map(String::from));
+        if textures.numbered {
+            taken.push("texnumber".into());
+        }
+        for of in &self.extras.of_faces {
+            let name = word(&of.name);
+            if taken.contains(&name) {
+                warnings.push(format!("the values {name} of faces are left out: others have their name"));
+                continue;
+            }
+            let missing = |r: &u32| *r as usize >= of.values.len();
+            if input.face_row.iter().any(missing) {
+                warnings.push(format!("faces without {name}: zeros are written"));
+            }
+            taken.push(name.clone());
+            self.face_values.push((name, Type::of(of.encoding).0, &of.values));
+        }
+    }
+
+    fn attributes(&mut self, input: &'a MeshInput, textures: &Textures, warnings: &mut Vec<String>) {
+        let plan = self;
+        let Some(w) = plan.wedges else { return };
+        plan.loose = plan.extras.loose.places(w.stride(), input.positions.len());
         plan.corner = vec![NONE; input.positions.len()];
         for (c, &v) in input.corners.iter().enumerate().rev() {
             if let Some(slot) = plan.corner.get_mut(v as usize) {
@@ -167,11 +217,7 @@ impl<'a> Plan<'a> {
                     ["red", "green", "blue", "alpha"][..channel.width].iter().map(|s| s.to_string()).collect()
                 }
                 Semantic::Custom(name) => {
-                    let name: String = name
-                        .chars()
-                        .map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c })
-                        .collect();
-                    let name = if name.is_empty() { "attribute".to_string() } else { name };
+                    let name = word(name);
                     match channel.width {
                         1 => vec![name],
                         n => (0..n).map(|i| format!("{name}_{i}")).collect(),
@@ -212,7 +258,16 @@ impl<'a> Plan<'a> {
                 ));
             }
         }
-        plan
+    }
+
+    /// The value of a channel at a vertex that no face uses.
+    fn of_loose(&self, v: usize, channel: usize) -> Option<&'a [f32]> {
+        let w = self.wedges?;
+        let row = *self.loose.get(&u32::try_from(v).ok()?)?;
+        let at = row * w.stride() + w.offset(channel);
+        let loose = &self.extras.loose;
+        let present = loose.present[row] >> channel & 1 == 1;
+        loose.rows.get(at..at + w.channels()[channel].width).filter(|_| present)
     }
 
     fn value(&self, corner: usize, channel: usize) -> Option<&'a [f32]> {
@@ -225,7 +280,10 @@ impl<'a> Plan<'a> {
     fn stored_as(&self, channel: usize) -> (Type, f64) {
         let Some(w) = self.wedges else { return (Type::F32, 1.0) };
         let c = &w.channels()[channel];
-        let values = || (0..w.len() as u32).filter_map(|id| w.get(id, channel)).flatten().copied();
+        let values = || {
+            let loose = self.loose.keys().filter_map(|&v| self.of_loose(v as usize, channel));
+            (0..w.len() as u32).filter_map(|id| w.get(id, channel)).chain(loose).flatten().copied()
+        };
         // Colours that are bytes in all but name are written as bytes, which every reader knows.
         let is_byte = |x: f32| (x * 255.0).round() / 255.0 == x && (0.0..=1.0).contains(&x);
         if matches!(c.semantic, Semantic::Color(_)) && c.encoding == Encoding::F32 && values().all(is_byte) {
@@ -269,11 +327,18 @@ impl<'a> Plan<'a> {
     ) -> Option<&'a [f32]> {
         let first = *self.corner.get(v)?;
         if first == NONE {
-            return None;
+            return self.of_loose(v, channel);
         }
         self.value(first as usize, channel)
             .or_else(|| lists.get(input, v).find_map(|c| self.value(c, channel)))
     }
+}
+
+/// A name as one word.
+fn word(name: &str) -> String {
+    let name: String =
+        name.chars().map(|c| if c.is_whitespace() || c.is_control() { '_' } else { c }).collect();
+    if name.is_empty() { "attribute".to_string() } else { name }
 }
 
 /// All corners of a vertex; gathered only when a vertex's first corner lacks a value.
@@ -408,6 +473,9 @@ fn write(
         header.push_str("property int texnumber\n");
     }
     plan.face_color.iter().for_each(|w| properties(&mut header, w));
+    for (name, stored, _) in &plan.face_values {
+        header.push_str(&format!("property {} {name}\n", stored.name()));
+    }
     if !input.wires.is_empty() {
         let (n, t) = (input.wires.len(), index.name());
         header.push_str(&format!("element edge {n}\nproperty {t} vertex1\nproperty {t} vertex2\n"));
@@ -434,6 +502,10 @@ fn write(
             let value = plan.value(face.start, w.channel).unwrap_or(&[]);
             (0..w.names.len())
                 .for_each(|i| sink.put(w.stored, value.get(i).map_or(0.0, |&x| x as f64 * w.one)));
+        }
+        for (_, stored, values) in &plan.face_values {
+            let row = input.face_row.get(f).copied().unwrap_or(NONE);
+            sink.put(*stored, values.get(row as usize).copied().unwrap_or(0.0));
         }
         sink.end_element();
     }

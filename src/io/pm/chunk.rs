@@ -293,6 +293,7 @@ pub fn read_shell(bytes: &[u8]) -> Result<Shelled, DecodeError> {
             name: owned(m.name),
             geometry: Default::default(),
             groups: groups.collect(),
+            extras: Default::default(),
         });
     }
     for n in shell.nodes {

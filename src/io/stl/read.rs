@@ -190,5 +190,5 @@ fn finish(
         face_group.clear();
     }
     let geometry = MeshInput { positions: points.gather(&kept), corners, face_group, ..Default::default() };
-    Decoded { scene: Scene::from_mesh(SceneMesh { name, geometry, groups }), warnings }
+    Decoded { scene: Scene::from_mesh(SceneMesh { name, geometry, groups, ..Default::default() }), warnings }
 }

@@ -89,6 +89,14 @@ impl Gathered<'_> {
             wedges: self.wedges.map(|w| used_wedges(w, &self.faces.wedges)).transpose()?,
             face_material: per_face(&input.face_material),
             face_group: per_face(&input.face_group),
+            face_row: match &input.face_row[..] {
+                [] => vec![],
+                // Caps are faces of their own.
+                rows => {
+                    let of = |(&f, &cap): (&u32, &bool)| if cap { NONE } else { rows[f as usize] };
+                    self.faces.origin.iter().zip(&self.faces.is_cap).map(of).collect()
+                }
+            },
         })
     }
 }

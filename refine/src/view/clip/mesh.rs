@@ -103,7 +103,7 @@ pub(super) struct Faces {
     pub(super) wedges: Vec<u32>,
     /// The face of the input that each comes from, or takes material and group of.
     pub(super) origin: Vec<u32>,
-    is_cap: Vec<bool>,
+    pub(super) is_cap: Vec<bool>,
 }
 
 impl Faces {
