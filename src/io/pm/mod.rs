@@ -79,9 +79,7 @@ pub fn decode_what_is_there(bytes: &[u8]) -> Result<DecodedProgressive, DecodeEr
     };
     let without = |said: &str| format!("{said}: there are no nodes, materials and images");
     let scene_is_lost = lost.iter().any(|c| c.kind == ChunkType::SCENE);
-    let fits = |bytes: &[u8]| {
-        check_count(&read_shell(bytes)?.scene, decoded.meshes.len())
-    };
+    let fits = |bytes: &[u8]| check_count(&read_shell(bytes)?.scene, decoded.meshes.len());
     let scene = match decoded.scene.as_deref().map(fits) {
         Some(Err(e)) => Some(without(&e.to_string())),
         _ => scene_is_lost.then(|| without("the scene around the meshes is lost")),
