@@ -91,15 +91,17 @@ struct Work<'a> {
     bars: Vec<(u32, u32)>,
 }
 
-/// The ring of a vertex as seen from it.
+/// The ring of a vertex as seen from it. Of a closed ring everything is there twice in a row, so that the faces that stay are one run wherever that begins.
 #[derive(Clone, Debug, Default)]
 struct Star {
-    /// Columns and rows from the vertex to its neighbours; the first again behind the last of a closed ring.
+    /// Columns and rows from the vertex to its neighbours.
     at: Vec<[i64; 2]>,
-    /// Twice the areas of the faces.
+    /// Twice the areas of the faces, each with the neighbour at which it begins.
     areas: Vec<i64>,
-    /// What it takes at least to go to a neighbour, and which.
-    ways: Vec<(f64, usize)>,
+    /// Heights of the neighbours.
+    heights: Vec<f64>,
+    /// What it takes at least to go to a neighbour, which, and the face over the vertex then.
+    ways: Vec<(f64, usize, usize)>,
 }
 
 /// What collapsing a block gave.
@@ -288,8 +290,8 @@ impl Work<'_> {
         // What was the best before is so again more often than not, and spares most of the work for the others.
         let first = ring.neighbours.iter().position(|&n| n == before);
         if let Some(i) = first
-            && self.least(u, i, ring).is_some()
-            && let Some(cost) = self.cost(u, i, ring, f64::INFINITY)
+            && let Some((_, over)) = self.least(u, i, ring)
+            && let Some(cost) = self.cost(u, (i, over), ring, (best, found))
         {
             (best, found) = (cost, before);
             if known.is_some_and(|k| (cost.0 as f32).to_bits() <= k) {
@@ -302,16 +304,15 @@ impl Work<'_> {
         let mut ways = std::mem::take(&mut self.star.ways);
         ways.clear();
         for i in (0..ring.neighbours.len()).filter(|&i| Some(i) != first) {
-            ways.extend(self.least(u, i, ring).filter(|&least| least <= best.0).map(|least| (least, i)));
+            let least = self.least(u, i, ring).filter(|(least, _)| *least <= best.0);
+            ways.extend(least.map(|(least, over)| (least, i, over)));
         }
         ways.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for &(least, i) in &ways {
+        for &(least, i, over) in &ways {
             if least > best.0 {
                 break;
             }
-            if let Some(cost) = self.cost(u, i, ring, best.0)
-                && (cost, ring.neighbours[i]) < (best, found)
-            {
+            if let Some(cost) = self.cost(u, (i, over), ring, (best, found)) {
                 (best, found) = (cost, ring.neighbours[i]);
             }
         }
@@ -327,30 +328,32 @@ impl Work<'_> {
     /// Looks at the ring of `u` from there.
     fn look(&mut self, u: u32, ring: &Ring) {
         let here = self.vertices[u as usize];
-        let Star { at, areas, .. } = &mut self.star;
-        let place = |&n: &u32| {
-            let v = self.vertices[n as usize];
-            [i64::from(v.x) - i64::from(here.x), i64::from(v.y) - i64::from(here.y)]
-        };
+        let Star { at, areas, heights, .. } = &mut self.star;
         at.clear();
-        at.extend(ring.neighbours.iter().map(place));
+        heights.clear();
+        for &n in &ring.neighbours {
+            let v = self.vertices[n as usize];
+            at.push([i64::from(v.x) - i64::from(here.x), i64::from(v.y) - i64::from(here.y)]);
+            heights.push(f64::from(v.z));
+        }
         if !ring.border {
-            at.extend_from_within(..1);
+            at.extend_from_within(..);
+            heights.extend_from_within(..);
         }
         areas.clear();
         areas.extend(at.windows(2).map(|w| cross(w[0], w[1])));
     }
 
-    /// The faces that stay when `u` goes to neighbour number `i`, in turn.
-    fn staying(ring: &Ring, i: usize) -> impl Iterator<Item = usize> + use<> {
+    /// The faces that stay when `u` goes to neighbour number `i`: the first and how many follow it, counted on around a closed ring.
+    #[inline]
+    fn staying(ring: &Ring, i: usize) -> (usize, usize) {
         let faces = ring.sides.len();
         // Those behind the one that begins at the neighbour, and before the one that ends there.
-        let (first, count) = match (ring.border, i) {
+        match (ring.border, i) {
             (true, 0) => (1, faces.saturating_sub(1)),
             (true, _) => (0, faces.saturating_sub(1)),
             (false, _) => (i + 1, faces.saturating_sub(2)),
-        };
-        (first..first + count).map(move |k| if k >= faces { k - faces } else { k })
+        }
     }
 
     /// Whether `u` must not go to `v` for the time being.
@@ -365,57 +368,74 @@ impl Work<'_> {
         false
     }
 
-    /// The error at `u` itself if it goes to its neighbour number `i`; `None` if it must not, as far as faces tell that.
-    fn least(&self, u: u32, i: usize, ring: &Ring) -> Option<f64> {
+    /// The error at `u` itself if it goes to its neighbour number `i`, and the face it lies in then; `None` if it must not, as far as faces tell that.
+    fn least(&self, u: u32, i: usize, ring: &Ring) -> Option<(f64, usize)> {
         let v = ring.neighbours[i];
         if self.kind[v as usize] == Kind::Locked || self.is_barred(u, v) {
             return None;
         }
-        let Star { at, areas, .. } = &self.star;
+        let Star { at, areas, heights, .. } = &self.star;
         let to = at[i];
         let n = ring.neighbours.len();
         // Along the border only, and straight on.
         if ring.border && ((i > 0 && i < n - 1) || cross(at[n - 1 - i], to) != 0) {
             return None;
         }
-        let height = |k: usize| f64::from(self.vertices[ring.neighbours[k] as usize].z);
-        let mut least = 0.0;
-        for k in Self::staying(ring, i) {
-            let (b, c) = (cross(to, at[k]), cross(to, at[k + 1]));
-            let area = areas[k] + b - c;
+        let (first, count) = Self::staying(ring, i);
+        let mut over = None;
+        let (ends, own) = (at.get(first..=first + count)?, areas.get(first..first + count)?);
+        let mut c = cross(to, ends[0]);
+        for (k, (end, &face)) in ends[1..].iter().zip(own).enumerate() {
+            // Weights are the areas opposite the corners.
+            let (b, next) = (c, cross(to, *end));
+            c = next;
+            let area = face + b - c;
             if area <= 0 {
                 return None;
             }
-            // Where the vertex lies in this face; weights are the areas opposite the corners.
+            // The vertex lies in this face.
             if b >= 0 && c <= 0 {
-                let next = if k + 1 == n { 0 } else { k + 1 };
-                let sum = areas[k] as f64 * height(i) - c as f64 * height(k) + b as f64 * height(next);
-                least = (sum / area as f64 - f64::from(self.vertices[u as usize].z)).abs();
+                over = Some((k, b, c, area));
             }
         }
-        Some(least)
+        let (k, b, c, area) = over.unwrap_or((0, 0, 0, 1));
+        let k = first + k;
+        let mut least = 0.0;
+        if over.is_some() {
+            let sum = areas[k] as f64 * heights[i] - c as f64 * heights[k] + b as f64 * heights[k + 1];
+            least = (sum / area as f64 - f64::from(self.vertices[u as usize].z)).abs();
+        }
+        Some((least, k))
     }
 
-    /// Error and squared length of taking `u` to its neighbour number `i`, where faces allow that; `None` if it is not legal, or dearer than `enough`.
-    fn cost(&self, u: u32, i: usize, ring: &Ring, enough: f64) -> Option<(f64, u32)> {
+    /// Error and squared length of taking `u` to its neighbour number `i`, where faces allow that; `None` if it is not legal, or not less than what is known. `over` is the face that
+    /// it then lies in.
+    fn cost(
+        &self,
+        u: u32,
+        (i, over): (usize, usize),
+        ring: &Ring,
+        known: ((f64, u32), u32),
+    ) -> Option<(f64, u32)> {
         let v = ring.neighbours[i];
-        let (at, to) = (self.vertices[u as usize], self.vertices[v as usize]);
         let n = ring.neighbours.len();
-        let place = |k: usize| self.vertices[ring.neighbours[if k == n { 0 } else { k }] as usize];
+        let (at, to) = (self.vertices[u as usize], self.vertices[v as usize]);
+        let enough = known.0.0;
         let mut most = 0.0f64;
-        for k in Self::staying(ring, i) {
-            most = most.max(self.relief.error([to, place(k), place(k + 1)], enough));
+        let (first, count) = Self::staying(ring, i);
+        // The face over the vertex is the likeliest to be too far off.
+        for k in std::iter::once(over).chain((first..first + count).filter(|&k| k != over)).take(count) {
+            let corner = |k: usize| self.vertices[ring.neighbours[if k >= n { k - n } else { k }] as usize];
+            most = most.max(self.relief.error([to, corner(k), corner(k + 1)], enough));
             if most > enough {
                 return None;
             }
         }
+        let (dx, dy) = (i64::from(to.x - at.x), i64::from(to.y - at.y));
+        let cost = (most, u32::try_from(dx * dx + dy * dy).unwrap_or(u32::MAX));
         // Last, as most are too dear.
         let wings = if ring.border { 1 } else { 2 };
-        if !self.links(v, wings, ring.sides.len()) {
-            return None;
-        }
-        let (dx, dy) = (i64::from(to.x - at.x), i64::from(to.y - at.y));
-        Some((most, u32::try_from(dx * dx + dy * dy).unwrap_or(u32::MAX)))
+        ((cost, v) < known && self.links(v, wings, ring.sides.len())).then_some(cost)
     }
 
     /// The link condition: `v` and the marked vertex have no neighbours in common but the tips of their faces. Also the limit of neighbours.

@@ -186,15 +186,13 @@ impl History {
     ) {
         forms.at.clear();
         forms.ends.clear();
-        let add = |forms: &mut Forms, others: [(Vertex, u32); 2]| {
-            let ends = others.map(|(v, head)| {
-                forms.at.push(v);
-                if head != NONE {
-                    self.chain(head, j, &mut forms.at);
-                }
-                forms.at.len() as u32
-            });
-            forms.ends.push(ends);
+        let add = |forms: &mut Forms, [second, third]: [(Vertex, u32); 2]| {
+            forms.at.push(second.0);
+            self.chain(second.1, j, &mut forms.at);
+            let middle = forms.at.len() as u32;
+            forms.at.push(third.0);
+            self.chain(third.1, j, &mut forms.at);
+            forms.ends.push([middle, forms.at.len() as u32]);
         };
         for (_, &side) in ring.sides.iter().enumerate().filter(|(k, _)| !dies(*k)) {
             let corner = |s: u32| (vertices[surface.corner[s as usize] as usize], self.head[s as usize]);

@@ -56,28 +56,29 @@ impl Surface {
         for v in 0..vertices {
             start[v + 1] += start[v];
         }
+        // Of every vertex the sides that begin there, each with its end.
         let mut fill = start.clone();
-        let mut from = vec![0; corner.len()];
-        for s in 0..sides {
-            let f = &mut fill[corner[s as usize] as usize];
-            from[*f as usize] = s;
-            *f += 1;
+        let mut from = vec![[0; 2]; corner.len()];
+        for (&[a, b, c], s) in faces.iter().zip((0..sides).step_by(3)) {
+            for (side, at, end) in [(s, a, b), (s + 1, b, c), (s + 2, c, a)] {
+                let f = &mut fill[at as usize];
+                from[*f as usize] = [end, side];
+                *f += 1;
+            }
         }
         let mut surface = Surface { corner, across: vec![NONE; sides as usize], at: vec![NONE; vertices] };
-        let ending = |surface: &Surface, at: u32, end: u32| {
+        let ending = |at: u32, end: u32| {
             let of = &from[start[at as usize] as usize..start[at as usize + 1] as usize];
-            of.iter().copied().find(|&t| surface.corner[next(t) as usize] == end)
+            of.iter().find(|[e, _]| *e == end).map(|&[_, side]| side)
         };
-        for s in 0..sides {
-            let (a, b) = (surface.corner[s as usize], surface.corner[next(s) as usize]);
-            surface.across[s as usize] = ending(&surface, b, a).unwrap_or(NONE);
+        let ends = || faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        for (across, [a, b]) in surface.across.iter_mut().zip(ends()) {
+            *across = ending(b, a).unwrap_or(NONE);
         }
-        for s in 0..sides {
+        for (s, [a, b]) in (0..sides).zip(ends()) {
             let across = surface.across[s as usize];
-            let (a, b) = (surface.corner[s as usize], surface.corner[next(s) as usize]);
             // The first that runs this way is the only one.
-            let first =
-                if across == NONE { ending(&surface, a, b)? } else { surface.across[across as usize] };
+            let first = if across == NONE { ending(a, b)? } else { surface.across[across as usize] };
             if first != s {
                 return None;
             }
@@ -148,6 +149,11 @@ impl Surface {
             let across = |s: u32| self.across[s as usize];
             Wing { side, kept: across(kept), removed: across(removed) }
         };
+        // Vertices on a border stay there, and those within it but for the one that something on it goes onto.
+        let on_border = |at: u32| self.across[self.at[at as usize] as usize] == NONE;
+        let kept_on_border = ring.border || on_border(v);
+        let tips = [left, right].map(|s| s.map(|s| self.corner[previous(s) as usize]));
+        let border = tips.map(|t| t.filter(|&t| on_border(t)));
         // Left: v -> u -> l; right: u -> v -> r.
         let left = left.map(|s| wing(s, previous(s), next(s)));
         let right = right.map(|s| wing(s, next(s), previous(s)));
@@ -177,7 +183,8 @@ impl Surface {
             for s in [w.kept, w.removed].into_iter().filter(|&s| s != NONE) {
                 for s in [s, next(s)] {
                     let at = self.corner[s as usize];
-                    self.at[at as usize] = self.anchor(s);
+                    let turn = if at == v { kept_on_border } else { border.contains(&Some(at)) };
+                    self.at[at as usize] = if turn { self.anchor(s) } else { s };
                 }
             }
         }
