@@ -57,13 +57,13 @@ impl Drape {
 }
 
 impl Space {
-    /// From column, row and height to where they stand; `None` on the globe, which is not flat.
-    pub fn matrix(&self, grid: &Grid) -> Option<DMat4> {
+    /// From column, row and height of a grid with so many columns and rows to where they stand; `None` on the globe, which is not flat.
+    pub fn matrix(&self, size: [usize; 2]) -> Option<DMat4> {
         Some(match *self {
             Space::Globe(_) => return None,
             Space::Grid => DMat4::IDENTITY,
             Space::World { spacing: [x, z], exaggeration } => {
-                let [column, row] = middle(grid);
+                let [column, row] = middle_of(size);
                 DMat4::from_cols(
                     DVec4::new(x, 0.0, 0.0, 0.0),
                     DVec4::new(0.0, 0.0, z, 0.0),
@@ -129,7 +129,12 @@ impl Space {
 
 /// Column and row of the middle of a grid: the origin of [`Space::World`].
 pub fn middle(grid: &Grid) -> [f64; 2] {
-    [grid.columns(), grid.rows()].map(|n| n.saturating_sub(1) as f64 / 2.0)
+    middle_of([grid.columns(), grid.rows()])
+}
+
+/// The same of a grid with so many columns and rows.
+pub fn middle_of(size: [usize; 2]) -> [f64; 2] {
+    size.map(|n| n.saturating_sub(1) as f64 / 2.0)
 }
 
 /// A scene of one mesh of this name; `tin` has columns and rows of `grid`. Front faces look up. O(vertices).
@@ -229,7 +234,9 @@ mod tests {
         for (i, &at) in tin.points.iter().enumerate() {
             let p = world.meshes[0].geometry.positions.get(i);
             let own = DVec3::new(at[0].into(), at[1].into(), tin.heights[i]);
-            assert!(space.matrix(&grid).unwrap().transform_point3(own).distance(p) < 1e-4);
+            assert!(
+                space.matrix([grid.columns(), grid.rows()]).unwrap().transform_point3(own).distance(p) < 1e-4
+            );
         }
     }
 

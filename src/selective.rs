@@ -8,6 +8,7 @@ mod morph;
 mod paged;
 mod player;
 mod record;
+mod samples;
 mod shared;
 mod shot;
 mod terrain;
@@ -15,14 +16,14 @@ mod tolerance;
 mod truly;
 
 pub use flight::{FlightPath, FrameSpace, PathError, circle, lemniscate, recorded};
-pub use heights::GroundJudgement;
+pub use heights::{GroundJudgement, Seams};
 pub use judge::{Judge, Judgement};
 pub use morph::Geomorph;
 pub use paged::{PagedScene, PagedSceneError, Ranges};
 pub use player::player_page;
 pub use record::{FrameCounts, RecordError, Recorder, Recording, upward};
 pub use shot::{ShotStyle, shot};
-pub use terrain::{Ground, Lap};
+pub use terrain::{Ground, GroundError, Lap};
 pub use truly::{TrulyScene, TrulySceneError};
 
 use crate::progressive::{Leftover, ProgressiveScene};

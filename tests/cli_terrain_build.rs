@@ -127,6 +127,33 @@ fn flights_keep_the_tolerance_at_every_sample() {
 }
 
 #[test]
+fn with_a_floor_the_bound_is_the_larger_of_it_and_the_tolerance() {
+    let p = Place::new();
+    p.done("generate terrain grid.tif --size 65 --seed 3 -q");
+    p.done("terrain build grid.tif grid.pm --block 16 --floor 2 -q");
+    let fly = "fly grid.pm --grid grid.tif --path lemniscate --path-speed fast --frames 7 --cull frustum";
+    let mut both = vec![];
+    for more in ["", " --memory 64"] {
+        let flown = p.done(&format!("{fly} --tau 0.5 --measure-every 3 --json{more}"));
+        assert!(flown.stderr.contains("bound: tau, 0.5 pixels, or the floor"), "{}", flown.stderr);
+        let r = flown.json();
+        for none in ["above", "cracks", "folds", "uncovered"] {
+            assert_eq!(r[none].as_u64(), Some(0), "{none}");
+        }
+        // Two metres near the eye are many pixels, and some samples are nearly that far off.
+        let measured = &r["frames"][3]["on_ground"];
+        let of = |name: &str| measured[name].as_f64().unwrap();
+        assert!(of("max_pixels") > 0.5 && of("beyond_pixels") <= 0.5);
+        assert!(of("max_pixels") <= of("floor_pixels") && of("max_height") > 1.0);
+        // Heights where it is due, cracks everywhere.
+        assert!(r["frames"][4]["on_ground"].is_null() && r["frames"][4]["cracks"].as_u64() == Some(0));
+        both.push(measured.clone());
+    }
+    // In memory, or read where it is needed: the same frames.
+    assert_eq!(both[0], both[1]);
+}
+
+#[test]
 fn what_cannot_be_built_is_said() {
     let p = place(false);
     p.run(&format!("terrain build hills.raw hills.ply {RAW}")).failed(2, "must end in .pm");

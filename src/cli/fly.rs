@@ -2,6 +2,7 @@
 
 mod flight;
 mod geomorph;
+mod ground;
 mod pace;
 mod paged;
 mod path;
@@ -40,6 +41,7 @@ Examples:
   progmesh fly dragon.ply --path circle --geomorph=time:20 --measure-every 10
   progmesh fly dragon.ply --path circle --html dragon.html --html-taus 1,4
   progmesh fly alps.pm --path lemniscate --grid alps.tif --path-speed fast --measure-every 10
+  progmesh fly alps.pm --path circle --grid alps.tif --cull frustum --memory 256 --measure-every 20
   progmesh fly city.pm --path walk.json --memory 256 --fetches 2
   progmesh fly dragon.ply --path circle --rule truly --measure-every 20
   progmesh fly terrain.obj --path canyon.frames --path-scale 1024 --budget-us 500
@@ -73,7 +75,7 @@ pub(crate) struct Args {
     /// Form triangle strips of what every frame shows, and report how long they are; not in the frame's time
     #[arg(long, help_heading = "Report")]
     strips: bool,
-    /// Measure the error that is shown on every Kth frame; with --memory all of the mesh is read for that, once
+    /// Measure the error that is shown on every Kth frame; with --memory all of the mesh is read for that, once, but over a grid (--grid), where also cracks are looked for on all frames
     #[arg(long, value_name = "K", value_parser = args::positive, allow_negative_numbers = true, help_heading = "Report")]
     measure_every: Option<usize>,
     /// Samples of the input to measure at
@@ -119,7 +121,7 @@ impl Args {
             let rule = &self.needs.rule;
             let made = extract::make(&self.input, &self.making, rule, self.quiet, &interrupt, &mut warnings)?;
             let (seconds, mut scene) = ([made.read, made.bounds], made.scene);
-            let course = self.path.lay(&source, scene.bounds(), &file)?;
+            let course = self.path.lay(&source, scene.bounds(), (&file, self.terrain()))?;
             let (name, vertices, full_faces) = (rule.name(&scene), scene.full_vertices(), scene.full_faces());
             let (frames, [shared, shown, tables], guard) = if rule.is_truly() {
                 let (frames, bytes, guard) = self.fly_truly(scene, &course, &interrupt)?;
@@ -204,8 +206,7 @@ impl Args {
             p.begin(self.needs.tau, true)?;
         }
         fly(scene, path, self.setting(self.needs.tau, interrupt), &file, &mut |step: &Step<'_>| {
-            let (measured, on_ground) =
-                measuring.measure(step.number, step.camera, || step.scene.triangles())?;
+            let (measured, over) = measuring.measure(step.number, step.camera, || step.scene.triangles())?;
             shots.take(step)?;
             if let Some(p) = &mut player {
                 p.take(step)?;
@@ -222,7 +223,9 @@ impl Args {
                     StripReport::of(meshes.map(|m| step.scene.shown(m).strips()))
                 }),
                 measured,
-                on_ground,
+                on_ground: over.on_ground,
+                cracks: over.cracks(),
+                folds: over.folds(),
                 ..step.timed.frame(&step.timed.done)
             });
             Ok(())

@@ -38,6 +38,9 @@ pub enum PathError {
         /// What is wrong.
         what: String,
     },
+    /// The heights that a path keeps above could not be read.
+    #[error(transparent)]
+    Heights(#[from] crate::terrain::RasterError),
     /// There is no camera in it.
     #[error(
         "no frames: a path is a JSON array of cameras, or lines `F id front(3) left(3) up(3) eye(3) zoom`"

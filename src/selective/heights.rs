@@ -1,10 +1,12 @@
 //! Measures a terrain that is shown against its samples, without the code that decides what to show: how far heights look off, and whether there are cracks.
 
+use super::samples::Validity;
 use super::terrain::Ground;
-use crate::refine::view::Camera;
-use crate::terrain::Grid;
+use crate::refine::view::{Camera, Frustum, Planes};
+use crate::terrain::{RasterError, Window};
 use glam::DVec3;
 use rustc_hash::FxHashMap;
+use std::ops::Range;
 
 /// What [`Ground::judge`] found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -16,10 +18,21 @@ pub struct GroundJudgement {
     pub max_pixels: f64,
     /// The mean.
     pub mean_pixels: f64,
+    /// The same as `max_pixels` of those samples alone whose difference of height is more than the floor.
+    pub beyond_pixels: f64,
+    /// How far the floor reaches in the picture at most: the largest distance between a sample inside the frustum and the place as far above or below it.
+    pub floor_pixels: f64,
     /// The largest difference of height among these, in the grid's units.
     pub max_height: f64,
     /// Samples of the valid region inside the frustum that no triangle covers.
     pub uncovered: usize,
+    /// See [`Seams`].
+    pub seams: Seams,
+}
+
+/// What [`Ground::seams`] found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Seams {
     /// Edges with one face that are not on the outline of the valid region: cracks.
     pub cracks: usize,
     /// Edges of more than two faces, and triangles that look down or are flat from above.
@@ -29,61 +42,178 @@ pub struct GroundJudgement {
 /// How far from a sample a corner may be and still be at it, steps: what rounding in the world may do.
 const AT_SAMPLE: f64 = 1e-4;
 
+/// What a difference of height may be more than the floor, as a part of the height: rounding on the way from the world.
+const ROUNDING: f64 = 1e-9;
+
+/// What was found in a tile.
+#[derive(Clone, Copy, Debug, Default)]
+struct Part {
+    of: GroundJudgement,
+    /// Of all samples' distances in the picture.
+    sum: f64,
+}
+
+impl Part {
+    fn join(&mut self, other: &Part) {
+        let (a, b) = (&mut self.of, &other.of);
+        a.samples += b.samples;
+        a.uncovered += b.uncovered;
+        a.max_pixels = a.max_pixels.max(b.max_pixels);
+        a.beyond_pixels = a.beyond_pixels.max(b.beyond_pixels);
+        a.floor_pixels = a.floor_pixels.max(b.floor_pixels);
+        a.max_height = a.max_height.max(b.max_height);
+        self.sum += other.sum;
+    }
+}
+
 impl Ground<'_> {
-    /// Measures what is shown, as triangles in the world, seen by `camera`. Every sample inside the frustum is looked at; those on a side shared by triangles against each.
-    /// O(samples + area of the triangles' boxes).
-    pub fn judge(&self, triangles: &[[DVec3; 3]], camera: &Camera) -> GroundJudgement {
-        let own: Vec<[DVec3; 3]> =
-            triangles.iter().map(|t| t.map(|p| self.to_grid.transform_point3(p))).collect();
-        let (columns, rows) = (self.grid.columns(), self.grid.rows());
+    /// Measures what is shown, as triangles in the world, seen by `camera`. Every sample inside the frustum is looked at; those on a side shared by triangles against each. At full detail
+    /// the mesh may be `floor` off, in the grid's units.
+    ///
+    /// Heights are read tile by tile, of those tiles alone of which something may be inside the frustum. O(samples in these + area of the triangles' boxes over them); memory O(triangles), and a tile for
+    /// each thread.
+    ///
+    /// # Errors
+    /// Those of reading heights.
+    pub fn judge(
+        &self,
+        triangles: &[[DVec3; 3]],
+        camera: &Camera,
+        floor: f64,
+    ) -> Result<GroundJudgement, RasterError> {
+        let own = self.in_grid(triangles);
         let frustum = camera.frustum();
+        let near = frustum.in_space_of(&self.to_world);
+        let sees = |k: usize| self.may_see(near.as_ref(), k);
+        // Of every tile that may be seen, the triangles over it.
+        let mut over: Vec<Option<Vec<u32>>> = (0..self.tiles.len()).map(|k| sees(k).then(Vec::new)).collect();
+        let size = [self.raster.columns(), self.raster.rows()];
+        for (t, n) in own.iter().zip(0u32..) {
+            for k in self.tiles.over(range(t.map(|p| p.x), 0..size[0]), range(t.map(|p| p.y), 0..size[1])) {
+                if let Some(list) = &mut over[k] {
+                    list.push(n);
+                }
+            }
+        }
+        let work: Vec<(usize, Vec<u32>)> =
+            over.into_iter().enumerate().filter_map(|(k, list)| Some((k, list?))).collect();
+        let one =
+            |(k, list): &(usize, Vec<u32>)| self.judge_tile(*k, (&own, list), (camera, &frustum), floor);
+        let mut all = Part::default();
+        for part in each(&work, one)? {
+            all.join(&part);
+        }
+        all.of.mean_pixels = all.sum / all.of.samples.max(1) as f64;
+        all.of.seams = self.seams_of(triangles, &own)?;
+        Ok(all.of)
+    }
+
+    /// Looks for cracks and folds alone, everywhere. O(triangles, and the length of the outline).
+    ///
+    /// # Errors
+    /// Those of reading heights: around void samples.
+    pub fn seams(&self, triangles: &[[DVec3; 3]]) -> Result<Seams, RasterError> {
+        self.seams_of(triangles, &self.in_grid(triangles))
+    }
+
+    fn in_grid(&self, triangles: &[[DVec3; 3]]) -> Vec<[DVec3; 3]> {
+        triangles.iter().map(|t| t.map(|p| self.to_grid.transform_point3(p))).collect()
+    }
+
+    /// Whether the box about the samples of a tile reaches into the frustum, which is given in the grid's coordinates if that is possible.
+    fn may_see(&self, frustum: Option<&Frustum>, k: usize) -> bool {
+        let (w, [low, high]) = (self.tiles.window(k), self.tiles.tile(k).range);
+        if low > high {
+            return false;
+        }
+        let last = |first: usize, n: usize| (first + n - 1) as f64;
+        // A little more than the box, for rounding of planes.
+        let slack = DVec3::new(1.0, 1.0, 1e-6 * (1.0 + low.abs().max(high.abs())));
+        let lo = DVec3::new(w.column as f64, w.row as f64, low) - slack;
+        let hi = DVec3::new(last(w.column, w.columns), last(w.row, w.rows), high) + slack;
+        frustum.is_none_or(|f| f.aabb(lo, hi, Planes::ALL).is_some())
+    }
+
+    /// The samples of a tile, with the triangles over it.
+    fn judge_tile(
+        &self,
+        k: usize,
+        (own, list): (&[[DVec3; 3]], &[u32]),
+        (camera, frustum): (&Camera, &Frustum),
+        floor: f64,
+    ) -> Result<Part, RasterError> {
+        let w = self.tiles.window(k);
+        // With the samples around it, which say what is valid at its border.
+        let before = |a: usize| a.saturating_sub(1);
+        let after = |a: usize, n: usize, size: usize| (a + n + 1).min(size);
+        let [columns, rows] = [self.raster.columns(), self.raster.rows()];
+        let (x0, y0) = (before(w.column), before(w.row));
+        let (x1, y1) = (after(w.column, w.columns, columns), after(w.row, w.rows, rows));
+        let grid = self.raster.window(Window::new(x0, y0, x1 - x0, y1 - y0))?;
+        let height = |x: usize, y: usize| grid.height(x - x0, y - y0);
         let world =
             |x: usize, y: usize, h: f64| self.to_world.transform_point3(DVec3::new(x as f64, y as f64, h));
-        let mut out = GroundJudgement::default();
-        let mut covered = vec![false; columns * rows];
-        let mut sum = 0.0;
-        for t in &own {
-            let range = |v: [f64; 3], n: usize| {
-                let (lo, hi) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
-                let last = n.saturating_sub(1) as f64;
-                let from = (lo - AT_SAMPLE).ceil().clamp(0.0, last) as usize;
-                let to = (hi + AT_SAMPLE).floor().clamp(-1.0, last);
-                // Empty where the triangle lies beside the grid, or between samples.
-                from..(to + 1.0) as usize
-            };
-            for y in range(t.map(|p| p.y), rows) {
-                for x in range(t.map(|p| p.x), columns) {
-                    let Some(height) = self.grid.height(x, y) else { continue };
-                    let Some(shown) = height_at(t, x as f64, y as f64) else { continue };
-                    let p = world(x, y, height);
-                    if !frustum.contains(p) {
+        let mut seen = vec![false; w.columns * w.rows];
+        let index = |x: usize, y: usize| (y - w.row) * w.columns + x - w.column;
+        for y in w.row..w.row + w.rows {
+            for x in w.column..w.column + w.columns {
+                seen[index(x, y)] = height(x, y).is_some_and(|h| frustum.contains(world(x, y, h)));
+            }
+        }
+        let mut covered = vec![false; seen.len()];
+        let mut part = Part::default();
+        for t in list.iter().map(|&t| &own[t as usize]) {
+            let plane = Face::new(t);
+            for y in range(t.map(|p| p.y), w.row..w.row + w.rows) {
+                for x in range(t.map(|p| p.x), w.column..w.column + w.columns) {
+                    let at = index(x, y);
+                    if !seen[at] {
                         continue;
                     }
-                    let pixels = match (camera.project(p), camera.project(world(x, y, shown))) {
-                        (Some((a, _)), Some((b, _))) => a.distance(b),
-                        _ => camera.pixels(p.distance(world(x, y, shown)), camera.near()),
+                    let Some(h) = height(x, y) else { continue };
+                    let Some(shown) = plane.height(x as f64, y as f64) else { continue };
+                    let p = world(x, y, h);
+                    let seen_at = camera.project(p).map(|s| s.0);
+                    let pixels = |other: f64| {
+                        let q = world(x, y, other);
+                        match (seen_at, camera.project(q)) {
+                            (Some(a), Some((b, _))) => a.distance(b),
+                            _ => camera.pixels(p.distance(q), camera.near()),
+                        }
                     };
-                    out.max_pixels = out.max_pixels.max(pixels);
-                    out.max_height = out.max_height.max((shown - height).abs());
-                    if !std::mem::replace(&mut covered[y * columns + x], true) {
-                        out.samples += 1;
-                        sum += pixels;
+                    let (off, far) = ((shown - h).abs(), pixels(shown));
+                    let found = &mut part.of;
+                    found.max_pixels = found.max_pixels.max(far);
+                    found.max_height = found.max_height.max(off);
+                    if off > floor + if floor > 0.0 { ROUNDING * (h.abs() + floor) } else { 0.0 } {
+                        found.beyond_pixels = found.beyond_pixels.max(far);
+                    }
+                    if !std::mem::replace(&mut covered[at], true) {
+                        found.samples += 1;
+                        part.sum += far;
+                        if floor > 0.0 {
+                            let reach = pixels(h + floor).max(pixels(h - floor));
+                            found.floor_pixels = found.floor_pixels.max(reach);
+                        }
                     }
                 }
             }
         }
-        out.mean_pixels = sum / out.samples.max(1) as f64;
-        for (i, _) in covered.iter().enumerate().filter(|(_, c)| !**c) {
-            let (x, y) = (i % columns, i / columns);
-            let Some(h) = self.grid.height(x, y).filter(|_| in_region(self.grid, x, y)) else { continue };
-            out.uncovered += usize::from(frustum.contains(world(x, y, h)));
+        let mut valid = |x: i64, y: i64| match (usize::try_from(x), usize::try_from(y)) {
+            (Ok(x), Ok(y)) => x >= x0 && y >= y0 && height(x, y).is_some(),
+            _ => false,
+        };
+        for (i, _) in
+            covered.iter().zip(&seen).enumerate().filter(|(_, (covered, seen))| **seen && !**covered)
+        {
+            let (x, y) = (w.column + i % w.columns, w.row + i / w.columns);
+            part.of.uncovered += usize::from(in_region(&mut valid, x, y));
         }
-        (out.cracks, out.folds) = self.seams(triangles, &own);
-        out
+        Ok(part)
     }
 
     /// Edges that are cracks; edges and triangles that are folds. Corners are the same where their places in the world are, bit for bit.
-    fn seams(&self, world: &[[DVec3; 3]], own: &[[DVec3; 3]]) -> (usize, usize) {
+    fn seams_of(&self, world: &[[DVec3; 3]], own: &[[DVec3; 3]]) -> Result<Seams, RasterError> {
         let mut edges: FxHashMap<[[u64; 3]; 2], (u32, [DVec3; 2])> = FxHashMap::default();
         let mut folds = 0;
         for (t, g) in world.iter().zip(own) {
@@ -96,9 +226,36 @@ impl Ground<'_> {
             }
         }
         folds += edges.values().filter(|e| e.0 > 2).count();
-        let open = edges.values().filter(|e| e.0 == 1 && !on_outline(self.grid, e.1));
-        (open.count(), folds)
+        let mut validity = Validity::new(self.raster, &self.tiles);
+        let mut valid = |x: i64, y: i64| validity.of(x, y);
+        let open = edges.values().filter(|e| e.0 == 1).filter(|e| !on_outline(&mut valid, e.1)).count();
+        validity.done()?;
+        Ok(Seams { cracks: open, folds })
     }
+}
+
+/// `f` of each, in order; on several threads with feature `parallel`. The first error in order.
+fn each<T: Sync, U: Send>(
+    all: &[T],
+    f: impl Fn(&T) -> Result<U, RasterError> + Sync,
+) -> Result<Vec<U>, RasterError> {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        let results: Vec<_> = all.par_iter().with_max_len(1).map(&f).collect();
+        results.into_iter().collect()
+    }
+    #[cfg(not(feature = "parallel"))]
+    all.iter().map(f).collect()
+}
+
+/// The samples of a range that a triangle with these coordinates may reach.
+fn range(v: [f64; 3], samples: Range<usize>) -> Range<usize> {
+    let (lo, hi) = (v[0].min(v[1]).min(v[2]), v[0].max(v[1]).max(v[2]));
+    // Empty where the triangle lies beside, or between samples; a cast takes what is below 0 for 0.
+    let from = ((lo - AT_SAMPLE).ceil() as usize).max(samples.start);
+    let to = ((hi + AT_SAMPLE + 1.0).floor() as usize).min(samples.end);
+    from..to.max(from)
 }
 
 /// Twice the area from above.
@@ -106,31 +263,46 @@ fn area(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
 }
 
-/// The height of a triangle at a place; `None` if it does not reach there from above, or is flat from above.
-fn height_at([a, b, c]: &[DVec3; 3], x: f64, y: f64) -> Option<f64> {
-    let p = DVec3::new(x, y, 0.0);
-    let all = area(*a, *b, *c);
-    let parts = [area(p, *b, *c), area(*a, p, *c), area(*a, *b, p)].map(|w| w / all);
-    // What rounding of corners in the world does to a side.
-    let longest =
-        (*a - *b).truncate().length().max((*b - *c).truncate().length()).max((*c - *a).truncate().length());
-    let least = -1e-9 * longest * longest / all.abs();
-    // Corners of one line in the grid are next to one in the world: what such a triangle has for an area is rounding, and so would its heights be. Its sides are those of others.
-    let flat = all.abs() <= 1e-9 * longest * longest;
-    (!flat && parts.iter().all(|&w| w >= least)).then(|| parts[0] * a.z + parts[1] * b.z + parts[2] * c.z)
+/// A triangle as seen from above.
+struct Face<'a> {
+    corners: &'a [DVec3; 3],
+    /// Twice its area.
+    area: f64,
+    /// The least weight of a corner that a place in it has: what rounding of corners in the world does to a side. Infinite for one that is flat from above.
+    least: f64,
+}
+
+impl Face<'_> {
+    fn new(corners: &[DVec3; 3]) -> Face<'_> {
+        let [a, b, c] = corners;
+        let area = area(*a, *b, *c);
+        let longest = (*a - *b)
+            .truncate()
+            .length()
+            .max((*b - *c).truncate().length())
+            .max((*c - *a).truncate().length());
+        // Corners of one line in the grid are next to one in the world: what such a triangle has for an area is rounding, and so would its heights be. Its sides are those of others.
+        let flat = area.abs() <= 1e-9 * longest * longest;
+        let least = if flat { f64::INFINITY } else { -1e-9 * longest * longest / area.abs() };
+        Face { corners, area, least }
+    }
+
+    /// Its height at a place; `None` if it does not reach there from above, or is flat from above.
+    fn height(&self, x: f64, y: f64) -> Option<f64> {
+        let p = DVec3::new(x, y, 0.0);
+        let [a, b, c] = *self.corners;
+        let parts = [area(p, b, c), area(a, p, c), area(a, b, p)].map(|w| w / self.area);
+        parts.iter().all(|&w| w >= self.least).then(|| parts[0] * a.z + parts[1] * b.z + parts[2] * c.z)
+    }
 }
 
 /// The triangle of a cell below its diagonal (`false`) or above it has three valid samples.
-fn valid(grid: &Grid, x: i64, y: i64, above: bool) -> bool {
-    let at = |x: i64, y: i64| match (usize::try_from(x), usize::try_from(y)) {
-        (Ok(x), Ok(y)) => grid.height(x, y).is_some(),
-        _ => false,
-    };
-    at(x, y) && at(x + 1, y + 1) && if above { at(x, y + 1) } else { at(x + 1, y) }
+fn whole(valid: &mut impl FnMut(i64, i64) -> bool, x: i64, y: i64, above: bool) -> bool {
+    valid(x, y) && valid(x + 1, y + 1) && if above { valid(x, y + 1) } else { valid(x + 1, y) }
 }
 
 /// A sample is a corner of a valid triangle of the grid.
-fn in_region(grid: &Grid, x: usize, y: usize) -> bool {
+fn in_region(valid: &mut impl FnMut(i64, i64) -> bool, x: usize, y: usize) -> bool {
     let (x, y) = (x as i64, y as i64);
     let around = [
         (x, y, false),
@@ -140,11 +312,11 @@ fn in_region(grid: &Grid, x: usize, y: usize) -> bool {
         (x - 1, y, false),
         (x, y - 1, true),
     ];
-    around.iter().any(|&(x, y, above)| valid(grid, x, y, above))
+    around.iter().any(|&(x, y, above)| whole(valid, x, y, above))
 }
 
 /// The edge runs along sides of the grid's triangles that have a valid triangle on one side only.
-fn on_outline(grid: &Grid, [a, b]: [DVec3; 2]) -> bool {
+fn on_outline(valid: &mut impl FnMut(i64, i64) -> bool, [a, b]: [DVec3; 2]) -> bool {
     let sample = |p: DVec3| {
         let (x, y) = (p.x.round(), p.y.round());
         let near = (p.x - x).abs() <= AT_SAMPLE && (p.y - y).abs() <= AT_SAMPLE;
@@ -160,9 +332,9 @@ fn on_outline(grid: &Grid, [a, b]: [DVec3; 2]) -> bool {
     (0..steps).all(|k| {
         let (x, y) = (x0 + k * dx + dx.min(0), y0 + k * dy + dy.min(0));
         let sides = match (dx != 0, dy != 0) {
-            (true, false) => [valid(grid, x, y, false), valid(grid, x, y - 1, true)],
-            (false, true) => [valid(grid, x, y, true), valid(grid, x - 1, y, false)],
-            _ => [valid(grid, x, y, false), valid(grid, x, y, true)],
+            (true, false) => [whole(valid, x, y, false), whole(valid, x, y - 1, true)],
+            (false, true) => [whole(valid, x, y, true), whole(valid, x - 1, y, false)],
+            _ => [whole(valid, x, y, false), whole(valid, x, y, true)],
         };
         sides[0] != sides[1]
     })
@@ -177,7 +349,7 @@ mod tests {
     use crate::refine::selective::{Cull, Limits};
     use crate::selective::{Lap, SelectiveScene};
     use crate::simplify::Placement;
-    use crate::terrain::tin;
+    use crate::terrain::{Grid, tin};
 
     const WORLD: Space = Space::World { spacing: [30.0, 25.0], exaggeration: 1.5 };
 
@@ -208,11 +380,11 @@ mod tests {
     }
 
     /// Every sample inside the frustum against every triangle, by the plane through its corners in the world.
-    fn slowly(g: &Ground<'_>, triangles: &[[DVec3; 3]], camera: &Camera) -> (usize, f64) {
+    fn slowly(grid: &Grid, g: &Ground<'_>, triangles: &[[DVec3; 3]], camera: &Camera) -> (usize, f64) {
         let frustum = camera.frustum();
         let (mut samples, mut most) = (0, 0.0f64);
-        for (i, &h) in g.grid.heights().iter().enumerate().filter(|(_, h)| !h.is_nan()) {
-            let at = DVec3::new((i % g.grid.columns()) as f64, (i / g.grid.columns()) as f64, h);
+        for (i, &h) in grid.heights().iter().enumerate().filter(|(_, h)| !h.is_nan()) {
+            let at = DVec3::new((i % grid.columns()) as f64, (i / grid.columns()) as f64, h);
             let p = g.to_world.transform_point3(at);
             if !frustum.contains(p) {
                 continue;
@@ -248,8 +420,8 @@ mod tests {
                         let cull = if tau == 0.0 { Cull::None } else { Cull::Frustum };
                         scene.adapt(&camera, tau, cull, &Limits::default()).unwrap();
                         let shown = scene.triangles();
-                        let judged = ground.judge(&shown, &camera);
-                        let (samples, most) = slowly(&ground, &shown, &camera);
+                        let judged = ground.judge(&shown, &camera, 0.0).unwrap();
+                        let (samples, most) = slowly(&grid, &ground, &shown, &camera);
                         assert_eq!(judged.samples, samples);
                         assert!(
                             (judged.max_pixels - most).abs() <= 1e-6 * most.max(1.0),
@@ -258,10 +430,10 @@ mod tests {
                         assert!(judged.mean_pixels <= judged.max_pixels);
                         if tau == 0.0 {
                             // The network's own error, and nothing left out.
-                            assert!(judged.max_height < 0.21 && judged.folds == 0);
+                            assert!(judged.max_height < 0.21 && judged.seams.folds == 0);
                         }
                         // The border is kept.
-                        assert_eq!((judged.cracks, judged.uncovered), (0, 0));
+                        assert_eq!((judged.seams.cracks, judged.uncovered), (0, 0));
                     }
                 }
             }
@@ -276,34 +448,38 @@ mod tests {
         let camera = &ground.lap(Lap::Circle, 1.0, 1).unwrap()[0];
         scene.adapt(camera, 8.0, Cull::All, &Limits::default()).unwrap();
         let whole = scene.triangles();
-        assert_eq!(ground.judge(&whole, camera).cracks, 0);
+        assert_eq!(ground.seams(&whole).unwrap().cracks, 0);
         // An inner triangle is missing: three sides.
         let middle = ground.to_world.transform_point3(DVec3::new(24.0, 20.0, 0.0));
         let far = |t: &[DVec3; 3]| t.iter().map(|p| p.distance(middle)).fold(0.0, f64::max);
         let inner = (0..whole.len()).min_by(|&a, &b| far(&whole[a]).total_cmp(&far(&whole[b]))).unwrap();
         let mut hole = whole.clone();
         hole.remove(inner);
-        assert_eq!(ground.judge(&hole, camera).cracks, 3);
+        assert_eq!(ground.seams(&hole).unwrap().cracks, 3);
         // One corner of it is a little higher: both sides of two edges are open.
         let mut apart = whole.clone();
         apart[inner][0] += 0.01 * ground.up();
-        assert_eq!(ground.judge(&apart, camera).cracks, 4);
+        assert_eq!(ground.seams(&apart).unwrap().cracks, 4);
         // Turned over, and twice.
         let mut turned = whole.clone();
         turned[inner].swap(0, 1);
-        assert_eq!(ground.judge(&turned, camera).folds, 1);
+        assert_eq!(ground.seams(&turned).unwrap().folds, 1);
         let mut twice = whole.clone();
         twice.push(whole[inner]);
-        assert_eq!(ground.judge(&twice, camera).folds, 3);
+        assert_eq!(ground.seams(&twice).unwrap().folds, 3);
         // A corner of the whole is missing: the sides that are open are no outline.
         let at_corner = (0..whole.len())
             .find(|&t| whole[t].iter().filter(|p| on_border(&ground, **p)).count() == 3)
             .map(|t| {
                 let mut rest = whole.clone();
                 rest.remove(t);
-                ground.judge(&rest, camera).cracks
+                ground.seams(&rest).unwrap().cracks
             });
         assert!(at_corner.is_none_or(|n| n > 0));
+    }
+
+    fn valid_in(grid: &Grid, x: i64, y: i64) -> bool {
+        x >= 0 && y >= 0 && grid.height(x as usize, y as usize).is_some()
     }
 
     fn on_border(g: &Ground<'_>, p: DVec3) -> bool {
@@ -318,7 +494,7 @@ mod tests {
         let grid = Grid::new(5, 5, heights).unwrap();
         let edge = |a: [i32; 2], b: [i32; 2]| {
             let p = |[x, y]: [i32; 2]| DVec3::new(x.into(), y.into(), 0.0);
-            on_outline(&grid, [p(a), p(b)])
+            on_outline(&mut |x, y| valid_in(&grid, x, y), [p(a), p(b)])
         };
         assert!(edge([0, 0], [4, 0]) && edge([4, 4], [4, 1]) && edge([1, 1], [2, 1]) && edge([1, 2], [1, 1]));
         assert!(edge([1, 2], [2, 3]) && edge([3, 2], [2, 1]));

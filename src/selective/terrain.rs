@@ -1,15 +1,17 @@
 //! Paths over terrain (Pires 2003): near the ground, at so many samples a frame.
 
 use super::flight::{FlightPath, PathError};
+use super::samples::Tiles;
 use crate::ground::Space;
 use crate::refine::view::{Camera, CameraError, CameraParameters, Projection};
-use crate::terrain::Grid;
+use crate::terrain::{Raster, RasterError, Window};
 use glam::{DMat4, DVec3};
 
-/// A grid where its mesh stands.
-#[derive(Clone, Debug)]
+/// A grid where its mesh stands. Of its heights only those needed are read.
+#[derive(Clone)]
 pub struct Ground<'a> {
-    pub(super) grid: &'a Grid,
+    pub(super) raster: &'a dyn Raster,
+    pub(super) tiles: Tiles,
     /// Column, row and height to the world, and back.
     pub(super) to_world: DMat4,
     pub(super) to_grid: DMat4,
@@ -17,6 +19,21 @@ pub struct Ground<'a> {
     spacing: f64,
     up: DVec3,
     least: f64,
+}
+
+/// There is nothing to fly over.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GroundError {
+    /// A space that flattens the grid, or the globe.
+    #[error("the grid does not stand in a flat space of three dimensions")]
+    Space,
+    /// No height.
+    #[error("no heights, all are void")]
+    Void,
+    /// Heights could not be read.
+    #[error(transparent)]
+    Raster(#[from] RasterError),
 }
 
 /// The paths that are flown over terrain.
@@ -48,18 +65,24 @@ impl Lap {
 }
 
 impl<'a> Ground<'a> {
-    /// The grid as a mesh in `space` has it. `None` for a space that flattens it, for the globe, and for a grid without heights.
-    pub fn new(grid: &'a Grid, space: Space) -> Option<Ground<'a>> {
-        let to_world = space.matrix(grid)?;
+    /// The grid as a mesh in `space` has it. Reads all heights once, window by window. O(samples); memory for a million of them, and 24 bytes for every 16,384.
+    ///
+    /// # Errors
+    /// A space that flattens it, the globe, a grid without heights, those of reading.
+    pub fn new(raster: &'a dyn Raster, space: Space) -> Result<Ground<'a>, GroundError> {
+        let to_world = space.matrix([raster.columns(), raster.rows()]).ok_or(GroundError::Space)?;
         let to_grid = to_world.inverse();
-        let finite = to_world.is_finite() && to_grid.is_finite();
+        let spacing = to_world.x_axis.truncate().length();
+        if !(to_world.is_finite() && to_grid.is_finite() && spacing > 0.0) {
+            return Err(GroundError::Space);
+        }
         let up = match space {
             Space::Grid => DVec3::Z,
             Space::World { .. } | Space::Globe(_) => DVec3::Y,
         };
-        let spacing = to_world.x_axis.truncate().length();
-        let (least, _) = grid.range().filter(|_| finite && spacing > 0.0)?;
-        Some(Ground { grid, to_world, to_grid, spacing, up, least })
+        let tiles = Tiles::read(raster)?;
+        let [least, _] = tiles.range().ok_or(GroundError::Void)?;
+        Ok(Ground { raster, tiles, to_world, to_grid, spacing, up, least })
     }
 
     /// What is upwards in the world.
@@ -69,7 +92,7 @@ impl<'a> Ground<'a> {
 
     /// Samples along the longer side, less one.
     fn side(&self) -> f64 {
-        self.grid.columns().max(self.grid.rows()).saturating_sub(1) as f64
+        self.raster.columns().max(self.raster.rows()).saturating_sub(1) as f64
     }
 
     /// The longer side, world units.
@@ -78,27 +101,30 @@ impl<'a> Ground<'a> {
     }
 
     /// The height of the grid's own triangles at a place; where they are void that of the cell's first sample, or the least there is.
-    fn height(&self, x: f64, y: f64) -> f64 {
+    fn height(&self, x: f64, y: f64) -> Result<f64, RasterError> {
         let clamp = |v: f64, n: usize| v.clamp(0.0, n.saturating_sub(1) as f64);
-        let (x, y) = (clamp(x, self.grid.columns()), clamp(y, self.grid.rows()));
+        let (x, y) = (clamp(x, self.raster.columns()), clamp(y, self.raster.rows()));
         // The cell; the last column and row belong to the cells before them.
         let cell = |v: f64, n: usize| (v.floor() as usize).min(n.saturating_sub(2));
-        let (c, r) = (cell(x, self.grid.columns()), cell(y, self.grid.rows()));
-        let at = |c: usize, r: usize| self.grid.height(c, r);
-        let Some(here) = at(c, r) else { return self.least };
+        let (c, r) = (cell(x, self.raster.columns()), cell(y, self.raster.rows()));
+        let part = |a: usize, n: usize| 2.min(n - a);
+        let window = Window::new(c, r, part(c, self.raster.columns()), part(r, self.raster.rows()));
+        let own = self.raster.window(window)?;
+        let at = |dx: usize, dy: usize| own.height(dx, dy);
+        let Some(here) = at(0, 0) else { return Ok(self.least) };
         let (u, v) = (x - c as f64, y - r as f64);
-        let Some(across) = at(c + 1, r + 1) else { return here };
-        let side = if u >= v { at(c + 1, r) } else { at(c, r + 1) };
-        let Some(side) = side else { return here };
+        let Some(across) = at(1, 1) else { return Ok(here) };
+        let side = if u >= v { at(1, 0) } else { at(0, 1) };
+        let Some(side) = side else { return Ok(here) };
         let (most, less) = (u.max(v), u.min(v));
-        here + (side - here) * (most - less) + (across - here) * less
+        Ok(here + (side - here) * (most - less) + (across - here) * less)
     }
 
     /// A lap at `speed` samples a frame on the mean, `frames` of it, the eye one step between samples above the ground.
     ///
-    /// Errors: a grid of one row or column.
+    /// Errors: a grid of one row or column; those of reading heights.
     pub fn lap(&self, lap: Lap, speed: f64, frames: usize) -> Result<FlightPath, PathError> {
-        let middle = crate::ground::middle(self.grid);
+        let middle = crate::ground::middle_of([self.raster.columns(), self.raster.rows()]);
         let side = self.side();
         let at = |t: f64| {
             let (sin, cos) = t.sin_cos();
@@ -116,13 +142,16 @@ impl<'a> Ground<'a> {
             Lap::Lemniscate => LEMNISCATE * HALF_WIDTH,
         };
         let step = std::f64::consts::TAU * speed / (length * side);
-        let point = |[x, y]: [f64; 2]| self.to_world.transform_point3(DVec3::new(x, y, self.height(x, y)));
+        let point = |[x, y]: [f64; 2]| {
+            let height = self.height(x, y)?;
+            Ok::<_, RasterError>(self.to_world.transform_point3(DVec3::new(x, y, height)))
+        };
         (0..frames)
             .map(|k| {
                 let t = k as f64 * step;
-                let eye = point(at(t)) + self.spacing * self.up;
+                let eye = point(at(t))? + self.spacing * self.up;
                 let target = match lap {
-                    Lap::Circle => point(middle) + self.spacing * self.up,
+                    Lap::Circle => point(middle)? + self.spacing * self.up,
                     Lap::Lemniscate => {
                         let [a, b] = [at(t - 1e-4), at(t + 1e-4)];
                         let flat = DVec3::new(b[0] - a[0], b[1] - a[1], 0.0);
@@ -159,10 +188,15 @@ impl<'a> Ground<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::terrain::Grid;
 
     fn grid() -> Grid {
         let height = |i: usize| ((i % 33) as f64 * 0.4).sin() + (i / 33) as f64 * 0.1;
         Grid::new(33, 33, (0..33 * 33).map(height).collect()).unwrap()
+    }
+
+    fn at(g: &Ground<'_>, x: f64, y: f64) -> f64 {
+        g.height(x, y).unwrap()
     }
 
     const WORLD: Space = Space::World { spacing: [30.0, 30.0], exaggeration: 2.0 };
@@ -172,14 +206,15 @@ mod tests {
         let grid = Grid::new(2, 2, vec![0.0, 1.0, 4.0, 10.0]).unwrap();
         let g = Ground::new(&grid, Space::Grid).unwrap();
         assert_eq!(
-            [g.height(0.0, 0.0), g.height(1.0, 0.0), g.height(0.0, 1.0), g.height(1.0, 1.0)],
+            [at(&g, 0.0, 0.0), at(&g, 1.0, 0.0), at(&g, 0.0, 1.0), at(&g, 1.0, 1.0)],
             [0.0, 1.0, 4.0, 10.0]
         );
-        assert_eq!([g.height(0.5, 0.5), g.height(1.0, 0.5), g.height(0.5, 1.0)], [5.0, 5.5, 7.0]);
+        assert_eq!([at(&g, 0.5, 0.5), at(&g, 1.0, 0.5), at(&g, 0.5, 1.0)], [5.0, 5.5, 7.0]);
         let void = Grid::new(2, 2, vec![7.0, f64::NAN, 4.0, 10.0]).unwrap();
         let g = Ground::new(&void, Space::Grid).unwrap();
-        assert_eq!([g.height(0.6, 0.5), g.height(1.0, 0.0)], [7.0, 7.0]);
-        assert!(Ground::new(&Grid::new(1, 1, vec![f64::NAN]).unwrap(), Space::Grid).is_none());
+        assert_eq!([at(&g, 0.6, 0.5), at(&g, 1.0, 0.0)], [7.0, 7.0]);
+        let none = Grid::new(1, 1, vec![f64::NAN]).unwrap();
+        assert!(matches!(Ground::new(&none, Space::Grid), Err(GroundError::Void)));
     }
 
     #[test]
@@ -202,7 +237,7 @@ mod tests {
                     assert!((mean / speed - 1.0).abs() < 0.05, "{lap:?} {mean} {speed}");
                     for c in &path {
                         let p = g.to_grid.transform_point3(c.eye() - unit * up);
-                        assert!((p.z - g.height(p.x, p.y)).abs() < 1e-6);
+                        assert!((p.z - at(&g, p.x, p.y)).abs() < 1e-6);
                         assert!(c.up().dot(up) > 0.3);
                     }
                 }

@@ -99,6 +99,8 @@ struct Fly {
     folds: Option<usize>,
     #[serde(deserialize_with = "present")]
     uncovered: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    floor_pixels: Option<f64>,
     memory: FlyMemory,
     #[serde(deserialize_with = "present")]
     paging: Option<Paging>,
@@ -153,6 +155,10 @@ struct FlyFrame {
     measured: Option<FlyMeasured>,
     #[serde(deserialize_with = "present")]
     on_ground: Option<FlyOnGround>,
+    #[serde(deserialize_with = "present")]
+    cracks: Option<usize>,
+    #[serde(deserialize_with = "present")]
+    folds: Option<usize>,
 }
 
 #[derive(Deserialize)]
@@ -161,10 +167,10 @@ struct FlyOnGround {
     samples: usize,
     max_pixels: f64,
     mean_pixels: f64,
+    beyond_pixels: f64,
+    floor_pixels: f64,
     max_height: f64,
     uncovered: usize,
-    cracks: usize,
-    folds: usize,
 }
 
 #[derive(Deserialize)]
@@ -206,7 +212,8 @@ fn selective_commands_print_one_object_with_the_documented_fields() {
         f.cracks.is_none()
             && f.folds.is_none()
             && f.uncovered.is_none()
-            && f.frames.iter().all(|f| f.on_ground.is_none())
+            && f.floor_pixels.is_none()
+            && f.frames.iter().all(|f| f.on_ground.is_none() && f.cracks.is_none() && f.folds.is_none())
     );
     p.done("generate terrain grid.tif --size 33 --seed 1 -q");
     p.done("terrain tin grid.tif mesh.ply --max-error 0.5 --on-samples -q");
@@ -216,7 +223,11 @@ fn selective_commands_print_one_object_with_the_documented_fields() {
     .unwrap();
     let judged = g.frames[1].on_ground.as_ref().unwrap();
     assert!(judged.samples > 0 && judged.mean_pixels <= judged.max_pixels && judged.max_height >= 0.0);
-    assert_eq!((judged.uncovered, judged.cracks, judged.folds), (0, 0, 0));
+    assert_eq!((judged.uncovered, g.frames[1].cracks, g.frames[1].folds), (0, Some(0), Some(0)));
+    assert_eq!(
+        (judged.beyond_pixels, judged.floor_pixels, g.floor_pixels),
+        (judged.max_pixels, 0.0, Some(0.0))
+    );
     assert_eq!((g.cracks, g.folds, g.uncovered), (Some(0), Some(0), Some(0)));
     assert!(e.strips.is_none());
     let s: Extract =

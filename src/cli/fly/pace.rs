@@ -2,8 +2,10 @@
 
 use super::super::Failure;
 use super::super::control::Interrupt;
+use super::super::terrain::input::unread;
+use super::ground::{OnGround, OverGrid};
 use super::path::Course;
-use super::report::{Frame, Measured, OnGround};
+use super::report::{Frame, Measured};
 use glam::DVec3;
 use progmesh::refine::selective::{Cull, Done, Limits, Regulator};
 use progmesh::refine::view::Camera;
@@ -97,6 +99,8 @@ pub(super) struct Measuring<'a> {
     every: Option<usize>,
     judge: Option<Judge>,
     ground: Option<&'a Ground<'a>>,
+    /// How far full detail may be off the ground.
+    floor: f64,
     file: &'a str,
 }
 
@@ -111,10 +115,10 @@ impl<'a> Measuring<'a> {
         judge: impl FnOnce() -> Result<Judge, Failure>,
     ) -> Result<Self, Failure> {
         let judge = every.filter(|_| course.ground.is_none()).map(|_| judge()).transpose()?;
-        Ok(Measuring { every, judge, ground: course.ground.as_ref(), file })
+        Ok(Measuring { every, judge, ground: course.ground.as_ref(), floor: course.floor, file })
     }
 
-    /// Measures frame `number`, if it is its turn; `triangles` is asked for what is shown then.
+    /// Measures frame `number`, if it is its turn; over terrain cracks are looked for in every frame. `triangles` is asked for what is shown then.
     ///
     /// Errors: what is shown cannot be measured.
     pub(super) fn measure(
@@ -122,9 +126,20 @@ impl<'a> Measuring<'a> {
         number: usize,
         camera: &Camera,
         triangles: impl FnOnce() -> Vec<[DVec3; 3]>,
-    ) -> Result<(Option<Measured>, Option<OnGround>), Failure> {
-        if self.every.is_none_or(|n| !number.is_multiple_of(n)) {
-            return Ok((None, None));
+    ) -> Result<(Option<Measured>, OverGrid), Failure> {
+        let Some(every) = self.every else { return Ok((None, OverGrid::default())) };
+        let due = number.is_multiple_of(every);
+        if let Some(ground) = self.ground {
+            let triangles = triangles();
+            if !due {
+                let seams = ground.seams(&triangles).map_err(unread)?;
+                return Ok((None, OverGrid { on_ground: None, seams: Some(seams) }));
+            }
+            let found = ground.judge(&triangles, camera, self.floor).map_err(unread)?;
+            return Ok((None, OverGrid { on_ground: Some(OnGround::of(&found)), seams: Some(found.seams) }));
+        }
+        if !due {
+            return Ok((None, OverGrid::default()));
         }
         let triangles = triangles();
         let measured = match &self.judge {
@@ -135,6 +150,6 @@ impl<'a> Measuring<'a> {
             }
             None => None,
         };
-        Ok((measured, self.ground.map(|g| OnGround::of(&g.judge(&triangles, camera)))))
+        Ok((measured, OverGrid::default()))
     }
 }

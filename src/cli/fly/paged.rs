@@ -23,14 +23,14 @@ impl Args {
         let file = self.input.name();
         // What looks at the whole mesh, or follows the changes of views that hold it.
         let morphing = self.geomorph.map(|_| "--geomorph");
-        let given = [morphing, self.path.given(), self.play.given()];
+        let given = [morphing, self.play.given()];
         if let Some(flag) = given.into_iter().flatten().next() {
             return Err(Failure::Usage(format!("--memory and {flag} do not go together")));
         }
         let start = Instant::now();
         let mut scene = paging::open(&self.input, mib)?;
         let read = start.elapsed().as_secs_f64();
-        let course = self.path.lay(source, scene.bounds(), &file)?;
+        let course = self.path.lay(source, scene.bounds(), (&file, self.terrain()))?;
         let mut most = scene.bytes();
         let frames = self.fly_paged(&mut scene, &course, interrupt, &mut most)?;
         self.something_seen(&frames, scene.bounds())?;
@@ -94,7 +94,7 @@ impl Args {
             pace.note(scene.face_count(), &done.done);
             let (dirty_index_bytes, dirty_wedges) = scene.take_changes();
             shots.draw(number, camera, || (scene.to_scene(), bounds, scene.face_count()))?;
-            let (measured, on_ground) = measuring.measure(number, camera, || scene.triangles())?;
+            let (measured, over) = measuring.measure(number, camera, || scene.triangles())?;
             frames.push(Frame {
                 faces: scene.face_count(),
                 vertices: scene.vertex_count(),
@@ -103,7 +103,9 @@ impl Args {
                 dirty_wedges,
                 strips: self.strips.then(|| StripReport::of(scene.views().iter().map(|v| v.strips()))),
                 measured,
-                on_ground,
+                on_ground: over.on_ground,
+                cracks: over.cracks(),
+                folds: over.folds(),
                 fetched: Some(done.fetched),
                 no_room: Some(done.no_room),
                 ..timed.frame(&done.done)

@@ -1,14 +1,15 @@
 //! `--path`, `--frames`, `--path-scale`, `--path-speed`, `--grid`: where a flight leads, and over what.
 
 use super::super::common::{Warnings, short};
-use super::super::terrain::input::{known_spacing, open_plain, whole};
+use super::super::terrain::input::{known_spacing, open_plain, unread};
 use super::super::{Failure, args};
 use glam::{DMat4, DVec3};
 use progmesh::ground::Space;
 use progmesh::io::files;
+use progmesh::io::grid::GridFile;
+use progmesh::io::pm::Terrain;
 use progmesh::refine::view::Camera;
-use progmesh::selective::{FlightPath, FrameSpace, Ground, Lap, circle, lemniscate, recorded};
-use progmesh::terrain::Grid;
+use progmesh::selective::{FlightPath, FrameSpace, Ground, GroundError, Lap, circle, lemniscate, recorded};
 use std::path::{Path, PathBuf};
 
 /// Where a flight leads.
@@ -55,13 +56,15 @@ enum Speed {
 #[derive(Default)]
 pub(super) struct Source {
     path: Vec<u8>,
-    grid: Option<(Grid, Option<[f64; 2]>)>,
+    grid: Option<GridFile>,
 }
 
 /// Where a flight leads, and over what.
 pub(super) struct Course<'a> {
     pub(super) cameras: FlightPath,
     pub(super) ground: Option<Ground<'a>>,
+    /// How far full detail may be off, in the grid's units.
+    pub(super) floor: f64,
 }
 
 /// Frames of a path that does not say.
@@ -93,11 +96,6 @@ fn speed(text: &str) -> Result<Speed, String> {
 
 impl PathArgs {
     /// As given.
-    /// A flag that was given, if any was.
-    pub(super) fn given(&self) -> Option<&'static str> {
-        self.grid.as_ref().map(|_| "--grid")
-    }
-
     pub(super) fn name(&self) -> &str {
         &self.path
     }
@@ -109,23 +107,21 @@ impl PathArgs {
             path => files::read_all(Path::new(path)).map_err(|e| Failure::Input(format!("{path}: {e}")))?,
         };
         let Some(grid) = &self.grid else { return Ok(Source { path, grid: None }) };
-        let file = open_plain(grid, warnings)?;
-        let heights = whole(&grid.display().to_string(), &file)?;
-        Ok(Source { path, grid: Some((heights, known_spacing(&file))) })
+        Ok(Source { path, grid: Some(open_plain(grid, warnings)?) })
     }
 
-    /// The cameras about something of these bounds, and the ground below them.
+    /// The cameras about something of these bounds, and the ground below them. `file` is the mesh's name, and `terrain` what it says of a grid.
     pub(super) fn lay<'a>(
         &self,
         source: &'a Source,
         bounds: Option<(DVec3, DVec3)>,
-        file: &str,
+        (file, terrain): (&str, Option<Terrain>),
     ) -> Result<Course<'a>, Failure> {
         let Some((lo, hi)) = bounds.filter(|(lo, hi)| (*hi - *lo).length() > 0.0) else {
             return Err(Failure::Input(format!("{file}: nothing is shown that one could fly about")));
         };
         let ground = match &source.grid {
-            Some((grid, known)) => Some(self.ground(grid, *known, (lo, hi), file)?),
+            Some(grid) => Some(self.ground(grid, (lo, hi), file)?),
             None => None,
         };
         let frames = self.frames.unwrap_or(FRAMES);
@@ -153,7 +149,7 @@ impl PathArgs {
         };
         let mut cameras = cameras.map_err(|e| Failure::Input(format!("{}: {e}", self.path)))?;
         cameras.truncate(self.frames.unwrap_or(usize::MAX));
-        Ok(Course { cameras, ground })
+        Ok(Course { cameras, ground, floor: terrain.map_or(0.0, |t| t.error) })
     }
 
     fn speed(&self, lap: Lap) -> f64 {
@@ -167,35 +163,38 @@ impl PathArgs {
     /// The grid where the mesh stands: in its own space or in the world's, whichever the mesh takes up most of.
     fn ground<'a>(
         &self,
-        grid: &'a Grid,
-        known: Option<[f64; 2]>,
+        grid: &'a GridFile,
         (lo, hi): (DVec3, DVec3),
         file: &str,
     ) -> Result<Ground<'a>, Failure> {
         let name = self.grid.as_deref().unwrap_or(Path::new("")).display();
-        let spacing = self.spacing.or(known).unwrap_or([1.0, 1.0]);
+        let spacing = self.spacing.or(known_spacing(grid)).unwrap_or([1.0, 1.0]);
+        let size = [grid.raster.columns(), grid.raster.rows()];
         let world = Space::World { spacing, exaggeration: self.exaggeration.unwrap_or(1.0) };
         let fits = |space: &Space| {
-            let Some(back) = space.matrix(grid).map(|m: DMat4| m.inverse()) else { return false };
+            let Some(back) = space.matrix(size).map(|m: DMat4| m.inverse()) else { return false };
             let (a, b) = (back.transform_point3(lo), back.transform_point3(hi));
             let within = |a: f64, b: f64, n: usize| {
                 let last = n.saturating_sub(1) as f64;
                 a.min(b) > -0.5 && a.max(b) < last + 0.5 && (b - a).abs() >= MOST_OF_IT * last
             };
-            within(a.x, b.x, grid.columns()) && within(a.y, b.y, grid.rows())
+            within(a.x, b.x, size[0]) && within(a.y, b.y, size[1])
         };
         let own = (self.spacing.is_none() && self.exaggeration.is_none()).then_some(Space::Grid);
         let space = own.into_iter().chain([world]).find(fits).ok_or_else(|| {
             Failure::Input(format!(
                 "{file}: reaches from {lo} to {hi}, which is not where a mesh of {name} stands: that has {} columns and {} rows, \
                  in the world {} by {} apart (--spacing)",
-                grid.columns(),
-                grid.rows(),
+                size[0],
+                size[1],
                 short(spacing[0]),
                 short(spacing[1])
             ))
         })?;
-        Ground::new(grid, space).ok_or_else(|| Failure::Input(format!("{name}: no heights, all are void")))
+        Ground::new(&*grid.raster, space).map_err(|e| match e {
+            GroundError::Raster(e) => unread(e),
+            e => Failure::Input(format!("{name}: {e}")),
+        })
     }
 }
 

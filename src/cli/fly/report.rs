@@ -4,7 +4,7 @@ use super::super::extract::StripReport;
 use super::super::paging::Paging;
 use super::super::rule::Guard;
 use super::common::{short, thousands};
-use progmesh::selective::GroundJudgement;
+use super::ground::OnGround;
 use serde::Serialize;
 
 /// The schema of `--json`; docs/json.md says what each field means.
@@ -30,6 +30,7 @@ pub(super) struct Report {
     cracks: Option<usize>,
     folds: Option<usize>,
     uncovered: Option<usize>,
+    floor_pixels: Option<f64>,
     memory: Memory,
     pub(super) paging: Option<Paging>,
     pub(super) guard: Option<Guard>,
@@ -57,6 +58,8 @@ pub(super) struct Frame {
     pub(super) no_room: Option<usize>,
     pub(super) measured: Option<Measured>,
     pub(super) on_ground: Option<OnGround>,
+    pub(super) cracks: Option<usize>,
+    pub(super) folds: Option<usize>,
 }
 
 #[derive(Clone, Copy, Serialize)]
@@ -64,32 +67,6 @@ pub(super) struct Measured {
     pub(super) samples: usize,
     pub(super) max_pixels: f64,
     pub(super) mean_pixels: f64,
-}
-
-/// A terrain against its grid.
-#[derive(Clone, Copy, Serialize)]
-pub(super) struct OnGround {
-    samples: usize,
-    max_pixels: f64,
-    mean_pixels: f64,
-    max_height: f64,
-    uncovered: usize,
-    cracks: usize,
-    folds: usize,
-}
-
-impl OnGround {
-    pub(super) fn of(j: &GroundJudgement) -> OnGround {
-        OnGround {
-            samples: j.samples,
-            max_pixels: j.max_pixels,
-            mean_pixels: j.mean_pixels,
-            max_height: j.max_height,
-            uncovered: j.uncovered,
-            cracks: j.cracks,
-            folds: j.folds,
-        }
-    }
 }
 
 #[derive(Serialize)]
@@ -147,13 +124,16 @@ impl Report {
         let time: f64 = later.iter().map(|f| f.us * 1e-6).sum();
         let ratio = |f: &Frame| {
             let tau = f.tau.filter(|t| *t > 0.0 && f.complete)?;
-            let pixels = f.measured.map(|m| m.max_pixels).or(f.on_ground.map(|g| g.max_pixels));
+            let pixels = f.measured.map(|m| m.max_pixels).or(f.on_ground.map(|g| g.beyond_pixels));
             pixels.map(|p| p / tau)
         };
         // While vertices move nothing is promised.
         let above = frames.iter().filter(|f| f.morphing == 0).filter_map(ratio).filter(|r| *r > 1.0);
         let judged = || frames.iter().filter_map(|f| f.on_ground.as_ref());
-        let sum = |f: &dyn Fn(&OnGround) -> usize| judged().next().map(|_| judged().map(f).sum());
+        let sum = |f: &dyn Fn(&Frame) -> Option<usize>| {
+            let each = || frames.iter().filter_map(f);
+            each().next().map(|_| each().sum())
+        };
         Report {
             command: "fly",
             path,
@@ -172,9 +152,10 @@ impl Report {
             strip_length: Statistics::of(later.iter().filter_map(|f| Some(f.strips?.mean_length))),
             measured_over_tau: Statistics::of(frames.iter().filter_map(ratio)),
             above: above.count(),
-            cracks: sum(&|g| g.cracks),
-            folds: sum(&|g| g.folds),
-            uncovered: sum(&|g| g.uncovered),
+            cracks: sum(&|f| f.cracks),
+            folds: sum(&|f| f.folds),
+            uncovered: sum(&|f| f.on_ground.map(|g| g.uncovered)),
+            floor_pixels: judged().map(|g| g.floor_pixels).reduce(f64::max),
             memory,
             paging: None,
             guard: None,
@@ -211,12 +192,17 @@ impl Report {
         if let Some(m) = &self.measured_over_tau {
             lines.push(s("measured error / tau", m));
         }
+        // A floor that is rounding alone is none.
+        let seen = |f: &f64| *f > 1e-3 * self.tau.unwrap_or(0.0);
+        if let (Some(floor), Some(tau)) = (self.floor_pixels.filter(seen), self.tau) {
+            lines.push(format!(
+                "  bound: tau, {} pixels, or the floor of full detail as seen, {} at most; above it are samples farther off than both",
+                short(tau),
+                short(floor)
+            ));
+        }
         if let Some(g) = &self.guard {
             lines.push(format!("  {}", g.text()));
-        }
-        if let Some(p) = &self.paging {
-            lines.push(format!("  {}", p.text()));
-            return lines;
         }
         if let (Some(cracks), Some(folds), Some(uncovered)) = (self.cracks, self.folds, self.uncovered) {
             lines.push(format!(
@@ -225,6 +211,10 @@ impl Report {
                 thousands(folds),
                 thousands(uncovered)
             ));
+        }
+        if let Some(p) = &self.paging {
+            lines.push(format!("  {}", p.text()));
+            return lines;
         }
         lines.push(format!(
             "  shared {} B a vertex; a view {} B for {} vertices shown at most, and {} B of tables",

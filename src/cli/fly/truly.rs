@@ -44,7 +44,7 @@ impl Args {
             guard.note(truly.guarded());
             pace.note(truly.face_count(), &timed.done);
             let (dirty_index_bytes, dirty_wedges) = truly.take_changes();
-            let (measured, on_ground) = measuring.measure(number, camera, || truly.triangles())?;
+            let (measured, over) = measuring.measure(number, camera, || truly.triangles())?;
             shots.draw(number, camera, || (truly.to_scene(), bounds, truly.face_count()))?;
             frames.push(Frame {
                 faces: truly.face_count(),
@@ -56,7 +56,9 @@ impl Args {
                     .strips
                     .then(|| StripReport::of(truly.views().iter().map(|v| Strips::new(v.indices())))),
                 measured,
-                on_ground,
+                on_ground: over.on_ground,
+                cracks: over.cracks(),
+                folds: over.folds(),
                 ..timed.frame(&timed.done)
             });
         }

@@ -7,7 +7,7 @@ pub mod hoppe;
 mod terrain;
 
 pub use chunk::{Extent, Shelled, read_shell, write_shell};
-pub use terrain::{Terrain, write_terrain};
+pub use terrain::{Terrain, read_terrain, write_terrain};
 
 use super::{DecodeError, Decoded};
 use crate::aif::NONE;

@@ -2,11 +2,14 @@
 
 use super::write_shell;
 use crate::blocks::{BuildError, Coded};
+use crate::io::grid::ReadAt;
 use crate::progressive::shell_of;
-use crate::refine::format::ChunkType;
+use crate::refine::format::{ChunkType, Piece, RangeReader};
 use crate::scene::{Scene, SceneMesh};
+use crate::selective::Ranges;
 use glam::{DMat4, DVec3};
 use std::io::Write;
+use std::sync::Arc;
 
 /// What a mesh is of a height grid: a `TERR` chunk. The mesh has x = column, and y = height and z = row in the length of a step by a column.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,6 +63,16 @@ impl Terrain {
         let sound = |x: f64| x >= 0.0 && x.is_finite();
         (t.columns > 1 && t.rows > 1 && [t.spacing[0], t.spacing[1], t.error].into_iter().all(sound))
             .then_some(t)
+    }
+}
+
+/// What a progressive mesh says of the grid that it was made of; `None` of one that is no terrain, or cannot be read, which its own decoder tells.
+pub fn read_terrain(source: Arc<dyn ReadAt>) -> Option<Terrain> {
+    let reader = RangeReader::new(Ranges(source)).ok()?;
+    let chunk = reader.directory().chunks.iter().find(|c| c.kind == ChunkType::TERRAIN)?;
+    match reader.read(chunk.index, None) {
+        Ok(Piece::Other(bytes)) => Terrain::from_bytes(&bytes),
+        _ => None,
     }
 }
 
