@@ -17,7 +17,7 @@ mod order;
 mod presence;
 mod replay;
 
-pub(crate) use attributes::Explicit;
+pub(crate) use attributes::{Explicit, NO_ENTRY};
 pub use build::{Built, BuiltAll, EncodeError, build, build_all};
 pub use cursor::{Cursor, Damage, Patch};
 pub(crate) use fans::{Fans, Opening};

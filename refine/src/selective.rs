@@ -23,6 +23,7 @@ mod lens;
 mod morph;
 mod output;
 mod patch;
+mod queue;
 mod regulator;
 mod timed;
 
@@ -43,7 +44,7 @@ use std::sync::Arc;
 
 /// A mesh between base and full detail, finer where a view needs it.
 ///
-/// Memory: about 64 B for every vertex shown, index buffer and links between faces included, and a quarter of a byte (8 B with attributes) for every vertex of the finest mesh;
+/// Memory: 62 B for every vertex shown, index buffer and links between faces included (and a part in 32 to grow into), and 3 bits (8 B with attributes) for every vertex of the finest mesh;
 /// [`View::bytes`] counts.
 #[derive(Clone, Debug)]
 pub struct View {
@@ -139,6 +140,13 @@ impl View {
     /// Appends split `i` and all it depends on that is not applied, in an order in which they can be; false (and nothing of use) if that are more than `most`.
     fn closure(&mut self, i: u32, most: usize, out: &mut Vec<u32>) -> bool {
         let from = out.len();
+        // Mostly all of it is.
+        if !self.front.is_applied(i)
+            && self.hierarchy.forest.needs.of(i).iter().all(|&d| self.front.is_applied(d))
+        {
+            out.push(i);
+            return most > 0;
+        }
         if !self.front.is_applied(i) {
             self.marked[i as usize / 64] |= 1 << (i % 64);
             out.push(i);
@@ -199,12 +207,12 @@ impl View {
         self.front.records[self.front.record(i) as usize].dependents == 0
     }
 
-    /// The split that would come next at the vertex of a record that is there, to be decided about; nothing for a leaf.
+    /// The split that would come next at the vertex of a record that is there, that vertex, and how many of its splits come before; nothing for a leaf.
     #[inline]
-    fn open(&self, record: u32) -> Option<Entry> {
+    fn next(&self, record: u32) -> Option<(u32, u32, usize)> {
         let h = &*self.hierarchy;
         let v = self.front.vertex_of_record(record);
         let k = self.front.turns(&h.forest, v);
-        h.forest.chain(v).get(k).map(|&i| Entry::after(h, i, v, k))
+        h.forest.chain(v).get(k).map(|&i| (i, v, k))
     }
 }

@@ -593,7 +593,7 @@ fn memory_grows_with_what_is_shown() {
         let (shown, tables) = view.bytes();
         let each = shown as f64 / view.vertex_count() as f64;
         // Below some thousand vertices what vectors hold in reserve counts.
-        assert!(each < 68.0 || view.vertex_count() < 2000, "{each} B for each of {}", view.vertex_count());
-        assert!(tables <= n / 4 + 32, "{tables}");
+        assert!(each < 64.0 || view.vertex_count() < 2000, "{each} B for each of {}", view.vertex_count());
+        assert!(tables <= 3 * n / 8 + 32, "{tables}");
     }
 }

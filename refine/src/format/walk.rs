@@ -369,15 +369,15 @@ mod tests {
     #[test]
     fn packed_halves_are_those_of_cursors() {
         for (edge, starts) in (0..3).flat_map(|e| [(e, false), (e, true)]) {
-            let pack = |h: Half| h.face << 3 | h.edge << 1 | h.starts as u32;
-            let h = Half { face: 5, edge, starts };
+            let pack = |h: Half| h.face() << 3 | h.edge() << 1 | h.starts() as u32;
+            let h = Half::new(5, edge, starts);
             let low = (pack(h) & 7) as usize;
             assert_eq!(turn(pack(h)), pack(h.turn()));
             assert_eq!(NEAR[low] as usize, h.corner());
             assert_eq!(FAR[low] as usize, h.far_corner());
             assert_eq!(cut(pack(h)), h.code());
             for starts in [false, true] {
-                let to = Half { face: 9, edge: 1, starts };
+                let to = Half::new(9, 1, starts);
                 let l = pack(to) ^ pack(h) & 1;
                 assert_eq!(across(h, link(h, to)), Some(to));
                 assert_eq!(l ^ pack(h) & 1, pack(to));

@@ -21,7 +21,7 @@ pub(crate) struct Forest {
     starts: Offsets,
     chains: Vec<u32>,
     two_faces: Ranks,
-    /// The split that makes every 64th face of splits.
+    /// The split that makes every 64th face of splits, and a bit: it is its second.
     makers: Vec<u32>,
     moves: Ranks,
     /// What splits need by the rule of the hierarchy.
@@ -88,9 +88,10 @@ impl Forest {
         let mut face = 0u32;
         let mut makers = Vec::with_capacity(n / 32 + 1);
         for (i, code) in (0u32..).zip(&pm.splits.code) {
+            let first = face;
             face += 1 + code.two_faces() as u32;
             while 64 * makers.len() < face as usize {
-                makers.push(i);
+                makers.push(i << 1 | u32::from(64 * makers.len() > first as usize));
             }
         }
         let base_faces = pm.base_faces.len() as u32;
@@ -206,14 +207,16 @@ impl Forest {
             return None;
         }
         let k = f.checked_sub(self.base_faces)?;
-        let mut i = self.makers[k as usize / 64];
+        // Where most splits make two faces, one step leads there.
+        let mark = self.makers[k as usize / 64];
+        let (mut i, mut ahead) = (mark >> 1, k % 64 + (mark & 1));
         loop {
-            let ahead = k - (i + self.two_faces.before(i));
             if ahead == 0 || (ahead == 1 && self.two_faces.get(i)) {
                 return Some((i, ahead == 1));
             }
             // Never beyond it: a split makes two at most.
             i += (ahead / 2).max(1);
+            ahead = k - (i + self.two_faces.before(i));
         }
     }
 

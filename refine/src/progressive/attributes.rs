@@ -85,6 +85,10 @@ pub(crate) struct Explicit {
     pub(crate) end: usize,
 }
 
+/// The entry of splits that have none.
+pub(crate) static NO_ENTRY: Explicit =
+    Explicit { pairs: Vec::new(), changed: Vec::new(), corners: Vec::new(), new: 0, end: 0 };
+
 impl Explicit {
     /// The entry at `at`, when there are `wedges` wedges; `None` if the stream ends in it or it names wedges that cannot be. New wedges must
     /// come in order.

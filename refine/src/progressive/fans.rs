@@ -32,19 +32,19 @@ impl Fans {
     /// The wedge at the vertex that `h` is seen from.
     #[inline]
     pub(crate) fn wedge(&self, h: Half) -> u32 {
-        self.corners[h.face as usize][h.corner()]
+        self.corners[h.face() as usize][h.corner()]
     }
 
     /// The wedge at the other end of `h`.
     #[inline]
     fn far_wedge(&self, h: Half) -> u32 {
-        self.corners[h.face as usize][h.far_corner()]
+        self.corners[h.face() as usize][h.far_corner()]
     }
 
     /// The same edge in the face across.
     #[inline]
     pub(crate) fn across(&self, h: Half) -> Option<Half> {
-        across(h, self.links[h.face as usize][h.edge as usize])
+        across(h, self.links[h.face() as usize][h.edge() as usize])
     }
 
     /// Where split `i` opens its fan. `right` is not looked at if the split makes one face. O(valence).
@@ -64,7 +64,7 @@ impl Fans {
             let to = if lost(cut) { cut } else { right };
             return Err(Damage::Reference { what: "split", at: i, to });
         }
-        let named = Half { face: cut >> 2, edge: cut & 3, starts: code.left_starts() };
+        let named = Half::new(cut >> 2, cut & 3, code.left_starts());
         let beyond = self.across(named);
         let left = if code.left_inner() {
             Opening { inner: Some(named), outer: beyond }
@@ -109,10 +109,10 @@ impl Fans {
         for _ in 0..count {
             let Some(h) = entry else { return };
             let c = h.corner();
-            let wedge = &mut self.corners[h.face as usize][c];
+            let wedge = &mut self.corners[h.face() as usize][c];
             *wedge = map(*wedge);
             if let Some(seen) = seen {
-                seen.push(3 * h.face + c as u32);
+                seen.push(3 * h.face() + c as u32);
             }
             entry = self.across(h.turn());
         }
@@ -161,14 +161,14 @@ impl Fans {
         if let Some(inner) = at.inner {
             self.connect(new, inner);
         }
-        Half { face: f, edge: b as u32, starts: !vu_next }
+        Half::new(f, b as u32, !vu_next)
     }
 
     /// Links two half-edges, both seen from the same vertex.
     #[inline]
     pub(crate) fn connect(&mut self, x: Half, y: Half) {
-        self.links[x.face as usize][x.edge as usize] = link(x, y);
-        self.links[y.face as usize][y.edge as usize] = link(y, x);
+        self.links[x.face() as usize][x.edge() as usize] = link(x, y);
+        self.links[y.face() as usize][y.edge() as usize] = link(y, x);
     }
 
     /// What a split's face lies between.
@@ -190,7 +190,7 @@ impl Fans {
     #[inline]
     pub(crate) fn run_length(&self, first: Option<Half>, end: u32) -> usize {
         let (mut entry, mut count) = (first, 0);
-        while let Some(h) = entry.filter(|h| h.face < end) {
+        while let Some(h) = entry.filter(|h| h.face() < end) {
             count += 1;
             entry = self.across(h.turn());
         }
@@ -202,7 +202,7 @@ impl Fans {
     pub(crate) fn close(&mut self, at: Opening) {
         match (at.outer, at.inner) {
             (Some(o), Some(i)) => self.connect(o, i),
-            (Some(h), None) | (None, Some(h)) => self.links[h.face as usize][h.edge as usize] = NONE,
+            (Some(h), None) | (None, Some(h)) => self.links[h.face() as usize][h.edge() as usize] = NONE,
             (None, None) => {}
         }
     }
@@ -217,7 +217,7 @@ impl Fans {
             let mut at = first;
             for _ in 0..self.corners.len() {
                 let Some(h) = self.across(at) else { break };
-                if h.face == start.face {
+                if h.face() == start.face() {
                     // All the way round.
                     return;
                 }
@@ -238,7 +238,7 @@ impl Fans {
         for first in [start.turn(), start] {
             let mut at = first;
             for _ in 0..self.corners.len() {
-                let Some(h) = self.across(at).filter(|h| h.face != start.face) else { break };
+                let Some(h) = self.across(at).filter(|h| h.face() != start.face()) else { break };
                 let w = self.wedge(h);
                 if !found.contains(&w) {
                     found.push(w);
@@ -253,7 +253,7 @@ impl Fans {
 /// The edges of a split's face `f` between its tip and the old vertex, seen from that, and between its tip and the new one, seen from that.
 #[inline]
 fn sides(f: u32, a: usize, vu_next: bool) -> (Half, Half) {
-    let after = Half { face: f, edge: a as u32, starts: false };
-    let before = Half { face: f, edge: previous(a) as u32, starts: true };
+    let after = Half::new(f, a as u32, false);
+    let before = Half::new(f, previous(a) as u32, true);
     if vu_next { (before, after) } else { (after, before) }
 }

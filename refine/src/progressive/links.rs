@@ -5,43 +5,73 @@
 
 use crate::aif::NONE;
 
-/// An edge of a face, seen from a vertex at one of its ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Half {
-    pub(crate) face: u32,
-    pub(crate) edge: u32,
-    /// The face begins the edge at that vertex.
-    pub(crate) starts: bool,
+/// An edge of a face, seen from a vertex at one of its ends, in one number: `face << 3 | starts << 2 | edge`.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Half(u32);
+
+/// The corner at the vertex, for each of the low three bits, four bits each.
+const CORNER: u32 = 0x0210_0021;
+/// The corner at the other end.
+const FAR_CORNER: u32 = 0x0021_0210;
+/// The low three bits of the face's other edge at the vertex.
+const TURN: u32 = 0x0102_0465;
+
+impl std::fmt::Debug for Half {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Half({}, {}, {})", self.face(), self.edge(), self.starts())
+    }
 }
 
 impl Half {
+    /// Edge `edge` of a face; `starts`: the face begins the edge at the vertex.
+    #[inline]
+    pub(crate) fn new(face: u32, edge: u32, starts: bool) -> Half {
+        Half(face << 3 | (starts as u32) << 2 | edge)
+    }
+
+    #[inline]
+    pub(crate) fn face(self) -> u32 {
+        self.0 >> 3
+    }
+
+    #[inline]
+    pub(crate) fn edge(self) -> u32 {
+        self.0 & 3
+    }
+
+    /// The face begins the edge at the vertex.
+    #[inline]
+    pub(crate) fn starts(self) -> bool {
+        self.0 & 4 != 0
+    }
+
+    #[inline]
+    fn look_up(self, table: u32) -> u32 {
+        table >> (4 * (self.0 & 7)) & 7
+    }
+
     /// The corner of the face at the vertex.
     #[inline]
     pub(crate) fn corner(self) -> usize {
-        if self.starts { self.edge as usize } else { next(self.edge as usize) }
+        self.look_up(CORNER) as usize
     }
 
     /// The corner of the face at the edge's other end.
     #[inline]
     pub(crate) fn far_corner(self) -> usize {
-        if self.starts { next(self.edge as usize) } else { self.edge as usize }
+        self.look_up(FAR_CORNER) as usize
     }
 
     /// The face's other edge at the vertex.
     #[inline]
     pub(crate) fn turn(self) -> Half {
-        let c = self.corner();
-        if self.starts {
-            Half { edge: previous(c) as u32, starts: false, ..self }
-        } else {
-            Half { edge: c as u32, starts: true, ..self }
-        }
+        Half(self.0 & !7 | self.look_up(TURN))
     }
 
     /// As references name it.
     #[inline]
     pub(crate) fn code(self) -> u32 {
-        self.face << 2 | self.edge
+        self.face() << 2 | self.edge()
     }
 }
 
@@ -58,14 +88,13 @@ pub(crate) fn previous(k: usize) -> usize {
 /// The link that stands in the face of `from`, to `to`, both seen from the same vertex.
 #[inline]
 pub(crate) fn link(from: Half, to: Half) -> u32 {
-    to.face << 3 | ((from.starts == to.starts) as u32) << 2 | to.edge
+    to.0 ^ (!from.0 & 4)
 }
 
 /// Where `link`, which stands at `from`, leads, seen from the same vertex.
 #[inline]
 pub(crate) fn across(from: Half, link: u32) -> Option<Half> {
-    let to = Half { face: link >> 3, edge: link & 3, starts: from.starts == (link >> 2 & 1 == 1) };
-    Some(to).filter(|_| link != NONE)
+    if link == NONE { None } else { Some(Half(link ^ (!from.0 & 4))) }
 }
 
 /// The links of faces given by the vertices of their corners. Edges of exactly two faces are linked. O(n log n) at worst.
@@ -97,12 +126,12 @@ pub(crate) fn link_faces(faces: &[[u32; 3]], vertices: usize) -> Vec<[u32; 3]> {
             let &[(_, a), (_, b)] = run else { continue };
             let half = |code: u32| {
                 let (face, edge) = (code >> 2, code & 3);
-                Half { face, edge, starts: faces[face as usize][edge as usize] as usize == v }
+                Half::new(face, edge, faces[face as usize][edge as usize] as usize == v)
             };
             let (x, y) = (half(a), half(b));
-            if x.face != y.face {
-                links[x.face as usize][x.edge as usize] = link(x, y);
-                links[y.face as usize][y.edge as usize] = link(y, x);
+            if x.face() != y.face() {
+                links[x.face() as usize][x.edge() as usize] = link(x, y);
+                links[y.face() as usize][y.edge() as usize] = link(y, x);
             }
         }
     }
@@ -117,12 +146,12 @@ mod tests {
     fn two_triangles_are_linked_and_know_how_they_run() {
         // Oriented alike, then one turned over.
         let links = link_faces(&[[0, 1, 2], [2, 1, 3]], 4);
-        let (x, y) = (Half { face: 0, edge: 1, starts: true }, Half { face: 1, edge: 0, starts: false });
+        let (x, y) = (Half::new(0, 1, true), Half::new(1, 0, false));
         assert_eq!(links[0], [NONE, link(x, y), NONE]);
         assert_eq!(across(x, links[0][1]), Some(y));
         assert_eq!(across(y, links[1][0]), Some(x));
         let links = link_faces(&[[0, 1, 2], [1, 2, 3]], 4);
-        let z = Half { face: 1, edge: 0, starts: true };
+        let z = Half::new(1, 0, true);
         assert_eq!(across(x, links[0][1]), Some(z));
         assert_eq!(across(z, links[1][0]), Some(x));
     }
@@ -134,11 +163,29 @@ mod tests {
     }
 
     #[test]
+    fn corners_and_turns_are_those_of_a_triangle() {
+        for (edge, starts) in (0..3).flat_map(|e| [(e, false), (e, true)]) {
+            let h = Half::new(11, edge, starts);
+            assert_eq!((h.face(), h.edge(), h.starts(), h.code()), (11, edge, starts, 44 | edge));
+            let (own, far) = if starts { (edge, (edge + 1) % 3) } else { ((edge + 1) % 3, edge) };
+            assert_eq!((h.corner(), h.far_corner()), (own as usize, far as usize));
+            let other = if starts { Half::new(11, (edge + 2) % 3, false) } else { Half::new(11, own, true) };
+            assert_eq!(h.turn(), other);
+            for (to, way) in (0..3).flat_map(|e| [(e, false), (e, true)]) {
+                let to = Half::new(5, to, way);
+                let own = link(h, to);
+                assert_eq!(own, 5 << 3 | ((starts == way) as u32) << 2 | to.edge());
+                assert_eq!(across(h, own), Some(to));
+            }
+        }
+    }
+
+    #[test]
     fn turning_about_a_vertex_meets_its_other_edge() {
-        let h = Half { face: 0, edge: 2, starts: true };
+        let h = Half::new(0, 2, true);
         assert_eq!(h.corner(), 2);
         assert_eq!(h.far_corner(), 0);
-        assert_eq!(h.turn(), Half { face: 0, edge: 1, starts: false });
+        assert_eq!(h.turn(), Half::new(0, 1, false));
         assert_eq!(h.turn().turn(), h);
     }
 }

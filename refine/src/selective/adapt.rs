@@ -2,6 +2,7 @@
 
 use super::clock::{Clock, Judges, Verdict};
 use super::entry::Entry;
+use super::queue::Queue;
 use super::{Lens, View};
 use crate::aif::NONE;
 
@@ -61,8 +62,6 @@ impl std::ops::AddAssign for Done {
 const BETWEEN: usize = 64;
 /// Looks at splits that count as many operations: a look takes about a tenth of an operation's time.
 const LOOKS: usize = 512;
-/// Needed splits lie in buckets by how urgent they are.
-const BUCKETS: usize = 256;
 /// Needed splits that are found too large for the faces left, before a frame gives up: each takes a walk over what it depends on. With 64 the limit of 20,000 faces is used but for 5 at most on dragon.
 const REFUSALS: usize = 64;
 
@@ -121,6 +120,15 @@ struct Look {
     next: Option<(u32, Verdict)>,
 }
 
+/// How far [`View::apply_with_all`] came.
+enum Applied {
+    Wholly,
+    /// There is no room for the faces.
+    Refused,
+    /// Another limit cut it short.
+    Partly,
+}
+
 /// Records from which on threads look ahead: below, handing out the work takes as long.
 #[cfg(feature = "parallel")]
 const MANY: usize = 4096;
@@ -145,7 +153,7 @@ impl View {
             && !self.front.is_applied(i)
             && judges.want(&Entry::of(&self.hierarchy, i))
         {
-            self.apply_with_all(i, &mut meter, &mut Vec::new(), |_| {});
+            self.apply_with_all(i, &mut meter, &mut Vec::new());
         }
         let ahead = self.look_ahead(&due, &judges, limits);
         self.resume = 0;
@@ -211,7 +219,7 @@ impl View {
             there.then(|| (v, self.front.turns(&h.forest, v)))
         });
         let turns: Vec<Option<(u32, usize)>> = turns.collect();
-        keep.extend(due.iter().map(|d| self.last(d)));
+        keep.extend(due.iter().map(|d| self.is_last(d).then(|| Entry::of(h, d.made))));
         next.extend(turns.iter().map(|t| {
             let (v, k) = (*t)?;
             h.forest.chain(v).get(k).map(|&i| Entry::after(h, i, v, k))
@@ -224,9 +232,10 @@ impl View {
     }
 
     /// The record is still what it was, and nothing depends on its split: that could be undone.
-    fn last(&self, d: &Due) -> Option<Entry> {
+    #[inline]
+    fn is_last(&self, d: &Due) -> bool {
         let r = &self.front.records[d.record as usize];
-        (d.made != NONE && r.made == d.made && r.dependents == 0).then(|| Entry::of(&self.hierarchy, d.made))
+        d.made != NONE && r.made == d.made && r.dependents == 0
     }
 
     /// Undoes splits that are not needed, until none is left that could be.
@@ -237,10 +246,13 @@ impl View {
                 self.resume = d.record;
                 return;
             }
-            let Some(e) = self.last(d) else { continue };
+            if !self.is_last(d) {
+                continue;
+            }
             meter.looks += 1;
             let known = ahead.get(k).and_then(|a| a.keep);
-            let verdict = known.unwrap_or_else(|| judges.of_last(&e, &self.clock));
+            let look = || judges.of_last(&Entry::of(&self.hierarchy, d.made), &self.clock);
+            let verdict = known.unwrap_or_else(look);
             if verdict.wanted {
                 d.kept = Some(verdict.slack);
                 continue;
@@ -271,58 +283,56 @@ impl View {
         }
     }
 
-    /// Applies split `i` and all it depends on, and tells what could come next; false if a limit other than that of faces cut it short.
-    fn apply_with_all(
-        &mut self,
-        i: u32,
-        meter: &mut Meter<'_>,
-        closure: &mut Vec<u32>,
-        mut next: impl FnMut(Entry),
-    ) -> bool {
+    /// Applies split `i` and all it depends on.
+    fn apply_with_all(&mut self, i: u32, meter: &mut Meter<'_>, closure: &mut Vec<u32>) -> Applied {
         closure.clear();
         // A split makes a face at least.
         let room = meter.room(self.face_count());
         let fits = self.closure(i, room, closure);
-        let h = self.hierarchy.clone();
-        let faces: usize = closure.iter().map(|&j| 1 + h.forest.two_faces(j) as usize).sum();
-        if !fits || faces > room {
-            meter.done.refused += 1;
-            return true;
+        if meter.limits.faces < usize::MAX {
+            let forest = &self.hierarchy.forest;
+            let faces: usize = closure.iter().map(|&j| 1 + forest.two_faces(j) as usize).sum();
+            if !fits || faces > room {
+                meter.done.refused += 1;
+                return Applied::Refused;
+            }
         }
         for &j in &*closure {
             if !meter.goes_on() {
                 self.unfinished = Some(i);
-                return false;
+                return Applied::Partly;
             }
             self.apply(j);
             meter.done.splits += 1;
             meter.since += 1;
             meter.done.forced += usize::from(j != i);
-            let old = h.mesh().splits.vertex[j as usize];
-            let chain = h.forest.chain(old);
-            // Mostly the last but few.
-            let turn = chain.iter().rposition(|&k| k <= j).map_or(0, |k| k + 1);
-            let (at, moved) = h.forest.places_after(h.mesh(), j);
-            if let Some(&below) = chain.get(turn) {
-                let at = moved.unwrap_or_else(|| h.forest.place(h.mesh(), old, turn));
-                next(Entry::at(&h, below, at));
-            }
-            if let Some(&below) = h.forest.chain(h.forest.base_vertices + j).first() {
-                next(Entry::at(&h, below, at));
-            }
         }
-        true
+        Applied::Wholly
+    }
+
+    /// The splits that replace the vertices that split `i` makes, to be decided about.
+    #[inline]
+    fn below(&self, i: u32) -> [Option<Entry>; 2] {
+        let h = &*self.hierarchy;
+        let old = h.mesh().splits.vertex[i as usize];
+        let chain = h.forest.chain(old);
+        // Mostly the last but few.
+        let turn = chain.iter().rposition(|&k| k <= i).map_or(0, |k| k + 1);
+        let (at, moved) = h.forest.places_after(h.mesh(), i);
+        let next = chain
+            .get(turn)
+            .map(|&below| Entry::at(h, below, moved.unwrap_or_else(|| h.forest.place(h.mesh(), old, turn))));
+        let new = h.forest.chain(h.forest.base_vertices + i).first();
+        [next, new.map(|&below| Entry::at(h, below, at))]
     }
 
     /// Applies splits that are needed, until none is left.
     fn refine(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, due: &[Due], ahead: &[Look]) {
-        // Buckets matter only if not all will be done.
+        // What comes first matters only if not all will be done.
         let sorted = meter.limits.faces < usize::MAX
             || meter.limits.operations < usize::MAX
             || meter.limits.expired.is_some();
-        let rank = |e: &Entry| if sorted { (judges.rank(e) as usize).min(BUCKETS - 1) } else { 0 };
-        let mut buckets: Vec<Vec<u32>> = vec![Vec::new(); if sorted { BUCKETS } else { 1 }];
-        let mut highest = 0;
+        let mut queue = Queue::new(sorted, self.hierarchy.splits());
         for (k, d) in due.iter().enumerate() {
             if !meter.goes_on() {
                 self.resume = d.record;
@@ -338,46 +348,37 @@ impl View {
                 Some(slack) => slack,
                 None => 0.0,
             };
-            let Some(e) = self.open(d.record) else {
+            let Some((i, v, turn)) = self.next(d.record) else {
                 self.front.records[d.record as usize].due = self.clock.due(kept, d.record);
                 continue;
             };
             meter.looks += 1;
-            let known = ahead.get(k).and_then(|a| a.next).filter(|n| n.0 == e.split);
-            let verdict = known.map_or_else(|| judges.of_next(&e, &self.clock), |n| n.1);
+            let known = ahead.get(k).and_then(|a| a.next).filter(|n| n.0 == i);
+            let entry = || Entry::after(&self.hierarchy, i, v, turn);
+            let verdict = known.map_or_else(|| judges.of_next(&entry(), &self.clock), |n| n.1);
             if verdict.wanted {
-                let b = rank(&e);
-                highest = highest.max(b);
-                buckets[b].push(e.split);
+                queue.push(i, || judges.rank(&entry()));
             } else {
                 self.front.records[d.record as usize].due = self.clock.due(kept.min(verdict.slack), d.record);
             }
         }
         let mut closure = Vec::new();
-        loop {
-            let Some(i) = buckets[highest].pop() else {
-                if highest == 0 {
+        while let Some(i) = queue.pop() {
+            // Others may have needed it before.
+            if !self.front.is_applied(i) {
+                if meter.is_full(self.face_count()) {
+                    meter.done.refused += 1 + queue.len();
                     return;
                 }
-                highest -= 1;
-                continue;
-            };
-            if self.front.is_applied(i) {
-                continue;
-            }
-            if meter.is_full(self.face_count()) {
-                meter.done.refused += 1 + buckets.iter().map(Vec::len).sum::<usize>();
-                return;
-            }
-            let goes_on = self.apply_with_all(i, meter, &mut closure, |e| {
-                if judges.want(&e) {
-                    let b = rank(&e);
-                    highest = highest.max(b);
-                    buckets[b].push(e.split);
+                match self.apply_with_all(i, meter, &mut closure) {
+                    Applied::Wholly => {}
+                    Applied::Refused => continue,
+                    Applied::Partly => return,
                 }
-            });
-            if !goes_on {
-                return;
+            }
+            // Below what only others need nothing is needed, as bounds nest.
+            for e in self.below(i).into_iter().flatten().filter(|e| judges.want(e)) {
+                queue.push(e.split, || judges.rank(&e));
             }
         }
     }

@@ -242,17 +242,20 @@ impl Lens {
             }
         }
         let (mut unseen, mut slack_unseen) = (false, 0.0f64);
-        if let Some(f) = &self.frustum {
-            let p = centre - f.origin();
-            for plane in f.planes() {
-                let inside = plane.normal.dot(p) + plane.offset;
+        if self.frustum.is_some() {
+            let (mut least, mut beyond) = (f64::INFINITY, 0.0f64);
+            for inside in self.sides.distances(centre) {
                 if inside < -radius {
-                    unseen = true;
-                    slack_unseen = slack_unseen.max(-(inside + radius) / far);
+                    beyond = beyond.max(-(inside + radius));
                 } else {
-                    slack = slack.min((inside + radius) / far);
+                    least = least.min(inside + radius);
                 }
             }
+            if beyond > 0.0 {
+                unseen = true;
+                slack_unseen = beyond / far;
+            }
+            slack = slack.min(least / far);
         }
         if self.back {
             let (line, reach, speed) =
@@ -291,9 +294,8 @@ impl Lens {
 
     /// How far the line of sight may move before a cone turns its back that looks the other way now, or all ways.
     fn slack_of_front(&self, e: &Entry, line: glam::DVec3, reach: f64) -> f64 {
-        let (axis, cos, _) = e.cone.unpack_parts();
         // It takes a line along the axis, and one longer than `reach`.
-        if cos <= 0.0 { f64::INFINITY } else { reach - line.dot(axis) }
+        e.cone.axis().map_or(f64::INFINITY, |axis| reach - line.dot(axis) / axis.length())
     }
 }
 
@@ -349,7 +351,11 @@ impl<'a> Judges<'a> {
 
     /// How urgent a split is that is needed: eight steps for each factor of two by which its error exceeds the tolerance.
     pub(crate) fn rank(&self, e: &Entry) -> u16 {
-        let urgency = self.lenses.iter().map(|l| l.urgency(e)).fold(0.0, f64::max);
+        let urgency = match self.lenses {
+            // It needs it, so it sees it.
+            [lens] => lens.urgency_seen(e),
+            lenses => lenses.iter().map(|l| l.urgency(e)).fold(0.0, f64::max),
+        };
         (urgency.max(1.0).log2() * 8.0).min(1e4) as u16
     }
 }

@@ -4,25 +4,24 @@ use super::index::Index;
 use super::patch::{self, Known, Sheet};
 use crate::aif::NONE;
 use crate::hierarchy::Forest;
-use crate::progressive::{Damage, Explicit, Fans, Half, ProgressiveMesh, SplitKind, link_faces};
+use crate::progressive::{Damage, Explicit, Fans, Half, NO_ENTRY, ProgressiveMesh, SplitKind, link_faces};
 
 /// A set of applied splits that is closed under dependencies, and the mesh it makes.
 ///
 /// Every vertex that is there has a *record*: those of the base come first, the others are of the splits that made them, used again when these are undone. A record of a
 /// split has two slots of the index buffer for the faces that it makes; a slot that holds none has three equal corners.
 ///
-/// Memory: 48 B of faces and links, 8 B of record and 5 to 7 B of index for a vertex there; for one of the finest mesh a bit, and with attributes 8 B.
+/// Memory: 48 B of faces and links, 8 B of record and 4 to 5 B of index for a vertex there; for one of the finest mesh a quarter of a byte, and with attributes 8 B.
 #[derive(Clone, Debug)]
 pub(crate) struct Front {
     fans: Fans,
     base_vertices: u32,
     base_faces: u32,
     pub(super) records: Vec<Record>,
-    /// Where splits have their records.
+    /// The splits that are applied, and where they have their records.
     index: Index,
     /// The first record that is free, which tells the next; [`LAST`] for none.
     free: u32,
-    applied: Vec<u64>,
     wedge_vertex: Vec<u32>,
     /// The row of every wedge, among those in the mesh.
     wedge_row: Vec<u32>,
@@ -97,9 +96,8 @@ impl Front {
             base_vertices: n0 as u32,
             base_faces: m0 as u32,
             records: vec![Record { made: NONE, dependents: 0, due: 0 }; n0],
-            index: Index::default(),
+            index: Index::new(n),
             free: LAST,
-            applied: vec![0; n.div_ceil(64)],
             wedge_vertex,
             wedge_row,
             vertices: n0,
@@ -133,7 +131,7 @@ impl Front {
     /// The record of split `i`; [`NONE`] if it is not applied.
     #[inline]
     pub(super) fn record(&self, i: u32) -> u32 {
-        self.index.find(i, |r| self.records[r as usize].made)
+        self.index.find(i)
     }
 
     /// The vertex of a record that is not free.
@@ -171,9 +169,10 @@ impl Front {
         if f < self.base_faces {
             return f;
         }
-        match forest.maker_of_face(f).filter(|m| self.is_applied(m.0)) {
-            Some((i, second)) => self.first_slot(self.record(i)) + second as u32,
-            None => NONE,
+        let Some((i, second)) = forest.maker_of_face(f) else { return NONE };
+        match self.record(i) {
+            NONE => NONE,
+            record => self.first_slot(record) + second as u32,
         }
     }
 
@@ -185,12 +184,12 @@ impl Front {
     /// Split `i` is applied.
     #[inline]
     pub(crate) fn is_applied(&self, i: u32) -> bool {
-        self.applied[i as usize / 64] >> (i % 64) & 1 != 0
+        self.index.has(i)
     }
 
     /// A bit for every split: it is applied.
-    pub(crate) fn applied_bits(&self) -> &[u64] {
-        &self.applied
+    pub(crate) fn applied_bits(&self) -> impl Iterator<Item = u64> + '_ {
+        self.index.words()
     }
 
     /// Vertex `v` is in the mesh.
@@ -246,45 +245,52 @@ impl Front {
         };
         let two = known.code.two_faces();
         let cuts = (here(pm.splits.left[k])?, if two { here(pm.splits.right[k])? } else { NONE });
-        let [first, _] = patch::split(&mut Whole { front: self, pm, forest, note }, &known, cuts, &explicit)?;
+        let [first, _] = patch::split(
+            &mut Whole { front: self, pm, forest, note },
+            &known,
+            cuts,
+            explicit.as_ref().unwrap_or(&NO_ENTRY),
+        )?;
         self.faces += 1 + two as usize;
         self.vertices += 1;
-        self.applied[k / 64] |= 1 << (k % 64);
         Ok(self.record_of_slot(first))
     }
 
     /// Undoes split `i`, which is applied, and on which nothing applied depends. O(valence).
     pub(crate) fn unsplit(&mut self, pm: &ProgressiveMesh, forest: &Forest, i: u32) {
         debug_assert!(self.is_applied(i));
-        let k = i as usize;
         // It was read when it was applied.
         let Ok((known, explicit)) = known(pm, forest, i) else { return };
         let two = known.code.two_faces();
         let first = self.first_slot(self.record(i));
         let slots = [first, first + two as u32];
-        patch::unsplit(&mut Whole { front: self, pm, forest, note: None }, &known, slots, &explicit);
+        patch::unsplit(
+            &mut Whole { front: self, pm, forest, note: None },
+            &known,
+            slots,
+            explicit.as_ref().unwrap_or(&NO_ENTRY),
+        );
         self.faces -= 1 + two as usize;
         self.vertices -= 1;
-        self.applied[k / 64] &= !(1 << (k % 64));
     }
 
     /// The slots of the faces around the vertex that `start` is seen from, each once.
     pub(crate) fn star(&self, start: Half, out: &mut Vec<u32>) {
-        out.push(start.face);
+        out.push(start.face());
         let mut at = start.turn();
         // The fan is a cycle, or ends at a border: then the other side as well.
         for _ in 0..self.fans.corners.len() {
             let Some(h) = self.fans.across(at) else { break };
-            if h.face == start.face {
+            if h.face() == start.face() {
                 return;
             }
-            out.push(h.face);
+            out.push(h.face());
             at = h.turn();
         }
         at = start;
         for _ in 0..self.fans.corners.len() {
-            let Some(h) = self.fans.across(at).filter(|h| h.face != start.face) else { break };
-            out.push(h.face);
+            let Some(h) = self.fans.across(at).filter(|h| h.face() != start.face()) else { break };
+            out.push(h.face());
             at = h.turn();
         }
     }
@@ -305,7 +311,7 @@ impl Front {
             return Err(Damage::Reference { what: "split", at: i as usize, to: cut });
         }
         let starts = pm.splits.code[i as usize].left_starts();
-        self.star(Half { face: slot, edge: cut & 3, starts }, out);
+        self.star(Half::new(slot, cut & 3, starts), out);
         Ok(())
     }
 
@@ -314,7 +320,7 @@ impl Front {
         let fl = self.first_slot(self.record(i));
         let (a, vu_next) = pm.splits.code[i as usize].left();
         let edge = (a as u32 + 1) % 3;
-        [Half { face: fl, edge, starts: !vu_next }, Half { face: fl, edge, starts: vu_next }]
+        [Half::new(fl, edge, !vu_next), Half::new(fl, edge, vu_next)]
     }
 
     /// An edge at the old vertex of split `i` (applied) beside its left face, in a face that stays.
@@ -347,15 +353,13 @@ impl Front {
             self.records[r as usize] = new;
             r
         };
-        let records = &self.records;
-        self.index.insert(i, r, |r| records[r as usize].made);
+        self.index.insert(i, r);
         r
     }
 
     #[inline]
     fn leave_record(&mut self, r: u32, i: u32) {
-        let records = &self.records;
-        self.index.remove(i, |r| records[r as usize].made);
+        self.index.remove(i);
         self.records[r as usize].made = FREE | self.free;
         self.free = r;
     }
@@ -365,25 +369,25 @@ impl Front {
         settle(&mut self.records);
         settle(&mut self.fans.corners);
         settle(&mut self.fans.links);
-        let records = &self.records;
-        self.index.settle(|r| records[r as usize].made);
+        self.index.settle();
     }
 
     /// Bytes that grow with the mesh shown, and bytes that each view takes for the whole mesh.
     pub(crate) fn bytes(&self) -> (usize, usize) {
+        let (index, blocks) = self.index.bytes();
         let shown = 12 * (self.fans.corners.capacity() + self.fans.links.capacity())
             + size_of::<Record>() * self.records.capacity()
-            + self.index.bytes()
+            + index
             + 8 * self.touched.capacity()
             + 4 * self.touched_wedges.capacity();
         let tables = self.wedge_vertex.len() + self.wedge_row.len();
-        (shown, 4 * tables + 8 * self.applied.len())
+        (shown, 4 * tables + blocks)
     }
 }
 
 /// What is to be known of split `i`, and its entry of the explicit stream.
 #[inline]
-fn known(pm: &ProgressiveMesh, forest: &Forest, i: u32) -> Result<(Known, Explicit), Damage> {
+fn known(pm: &ProgressiveMesh, forest: &Forest, i: u32) -> Result<(Known, Option<Explicit>), Damage> {
     let k = i as usize;
     let (code, new_vertex) = (pm.splits.code[k], forest.base_vertices + i);
     let rows = forest.rows.as_ref().map(|r| r.of(pm, i));
@@ -397,11 +401,11 @@ fn known(pm: &ProgressiveMesh, forest: &Forest, i: u32) -> Result<(Known, Explic
     };
     let explicit = match (code.kind(), &pm.wedges, rows) {
         (SplitKind::Explicit, Some(s), Some(r)) => {
-            Explicit::read(&s.explicit, r.explicit as usize, code.two_faces(), r.wedge)
-                .ok_or(Damage::Wedges(k))?
+            let entry = Explicit::read(&s.explicit, r.explicit as usize, code.two_faces(), r.wedge);
+            Some(entry.ok_or(Damage::Wedges(k))?)
         }
         (SplitKind::Explicit, ..) => return Err(Damage::Fan(k)),
-        _ => Explicit::default(),
+        _ => None,
     };
     Ok((known, explicit))
 }

@@ -1,112 +1,175 @@
-//! Where each applied split is, in memory that grows with those applied: linear probing, keys beside the values they lead to.
+//! Which splits are applied, and where each has its record.
 
 use crate::aif::NONE;
 
-/// From splits to records. Which split a record is of, the records say themselves: `of` in the calls below. 5 to 7 B a split.
-#[derive(Clone, Debug, Default)]
+/// A set of splits, and a record of each: 64 splits make a block, and the records of those in the set are a run in one pool, in the order of the splits. So a record is found by
+/// counting bits, in two reads. 16 B for 64 splits there are, and 4 to 5 B for one in the set.
+#[derive(Clone, Debug)]
 pub(super) struct Index {
-    /// Records; [`NONE`] for free places.
-    places: Vec<u32>,
-    len: usize,
+    blocks: Vec<Block>,
+    pool: Vec<u32>,
+    /// The first free run of each room; it begins with where the next is, or [`NONE`].
+    free: [u32; ROOMS.len()],
+    /// What the pool takes if no run is longer than it must be.
+    least: usize,
 }
 
-/// Five places for four splits at most: a search then looks at three on average.
-const FULL: [usize; 2] = [4, 5];
-/// Grown to so many for two.
-const ROOMY: [usize; 2] = [5, 2];
-/// When a frame is over, more than so many for three are too many, and four for three are left.
-const SPARE: [usize; 2] = [5, 3];
-const LEFT: [usize; 2] = [4, 3];
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    /// In the set.
+    bits: u64,
+    /// Where its run begins.
+    start: u32,
+    /// The length of its run, by its place in [`ROOMS`].
+    room: u8,
+}
+
+/// Lengths of runs. A third too long at most, a twelfth on average.
+const ROOMS: [u8; 17] = [0, 1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 28, 32, 40, 48, 56, 64];
+/// The least room for each number of records.
+const FIT: [u8; 65] = {
+    let (mut fit, mut count, mut room) = ([0; 65], 0, 0);
+    while count <= 64 {
+        if ROOMS[room as usize] < count as u8 {
+            room += 1;
+        }
+        fit[count] = room;
+        count += 1;
+    }
+    fit
+};
+/// When a frame is over, the pool may be longer than it must be by a part in 16 and so many.
+const SPARE: usize = 64;
+
+impl Block {
+    fn len(self) -> usize {
+        self.bits.count_ones() as usize
+    }
+
+    /// Where in its run the record of split `i` is, or would be.
+    #[inline]
+    fn rank(self, i: u32) -> usize {
+        (self.bits & ((1 << (i % 64)) - 1)).count_ones() as usize
+    }
+}
 
 impl Index {
-    #[inline]
-    fn home(&self, split: u32) -> usize {
-        // Fibonacci hashing: runs of splits are spread evenly.
-        let mixed = split.wrapping_mul(0x9e37_79b1) as u64;
-        ((mixed * self.places.len() as u64) >> 32) as usize
-    }
-
-    #[inline]
-    fn next(&self, at: usize) -> usize {
-        if at + 1 == self.places.len() { 0 } else { at + 1 }
-    }
-
-    /// The place of a split, or the free one that ends the search for it. There is one.
-    #[inline]
-    fn search(&self, split: u32, of: impl Fn(u32) -> u32) -> usize {
-        let mut at = self.home(split);
-        while self.places[at] != NONE && of(self.places[at]) != split {
-            at = self.next(at);
+    /// For `n` splits, none of them in the set.
+    pub(super) fn new(n: usize) -> Index {
+        Index {
+            blocks: vec![Block::default(); n.div_ceil(64)],
+            pool: Vec::new(),
+            free: [NONE; ROOMS.len()],
+            least: 0,
         }
-        at
     }
 
-    /// The record of a split; [`NONE`] if it has none.
+    /// Split `i` is in the set.
     #[inline]
-    pub(super) fn find(&self, split: u32, of: impl Fn(u32) -> u32) -> u32 {
-        if self.len == 0 { NONE } else { self.places[self.search(split, of)] }
+    pub(super) fn has(&self, i: u32) -> bool {
+        self.blocks[i as usize / 64].bits >> (i % 64) & 1 != 0
     }
 
-    /// Adds a split that is not there.
+    /// The bits of the set, 64 splits a word.
+    pub(super) fn words(&self) -> impl Iterator<Item = u64> + '_ {
+        self.blocks.iter().map(|b| b.bits)
+    }
+
+    /// The record of a split; [`NONE`] if it is not in the set.
     #[inline]
-    pub(super) fn insert(&mut self, split: u32, record: u32, of: impl Fn(u32) -> u32) {
-        if (self.len + 1) * FULL[1] > self.places.len() * FULL[0] {
-            self.grow(&of);
+    pub(super) fn find(&self, i: u32) -> u32 {
+        let block = self.blocks[i as usize / 64];
+        if block.bits >> (i % 64) & 1 == 0 {
+            return NONE;
         }
-        let at = self.search(split, of);
-        self.places[at] = record;
-        self.len += 1;
+        self.pool[block.start as usize + block.rank(i)]
     }
 
+    /// Adds a split that is not in the set.
+    #[inline]
+    pub(super) fn insert(&mut self, i: u32, record: u32) {
+        let at = i as usize / 64;
+        let count = self.blocks[at].len();
+        if count == ROOMS[self.blocks[at].room as usize] as usize {
+            self.grow(at);
+        }
+        let block = &mut self.blocks[at];
+        let (start, rank) = (block.start as usize, block.rank(i));
+        block.bits |= 1 << (i % 64);
+        // Mostly the last.
+        if rank < count {
+            self.pool.copy_within(start + rank..start + count, start + rank + 1);
+        }
+        self.pool[start + rank] = record;
+        self.least += (ROOMS[FIT[count + 1] as usize] - ROOMS[FIT[count] as usize]) as usize;
+    }
+
+    /// Takes a split out that is in the set.
+    #[inline]
+    pub(super) fn remove(&mut self, i: u32) {
+        let at = i as usize / 64;
+        let block = &mut self.blocks[at];
+        let (start, rank, count) = (block.start as usize, block.rank(i), block.len());
+        block.bits &= !(1 << (i % 64));
+        if rank + 1 < count {
+            self.pool.copy_within(start + rank + 1..start + count, start + rank);
+        }
+        self.least -= (ROOMS[FIT[count] as usize] - ROOMS[FIT[count - 1] as usize]) as usize;
+        if count == 1 {
+            self.leave(at);
+        }
+    }
+
+    /// Gives the run of a block back.
+    fn leave(&mut self, at: usize) {
+        let Block { start, room, .. } = self.blocks[at];
+        if room > 0 {
+            self.pool[start as usize] = std::mem::replace(&mut self.free[room as usize], start);
+            self.blocks[at].room = 0;
+        }
+    }
+
+    /// Moves a block to the next longer run.
     #[cold]
-    fn grow(&mut self, of: &impl Fn(u32) -> u32) {
-        self.resize((self.len + 1) * ROOMY[0] / ROOMY[1] + 16, of);
-    }
-
-    /// Gives back what it has grown too large.
-    pub(super) fn settle(&mut self, of: impl Fn(u32) -> u32) {
-        if self.places.len() > self.len * SPARE[0] / SPARE[1] + 64 {
-            self.resize(self.len * LEFT[0] / LEFT[1] + 16, &of);
-        }
-    }
-
-    fn resize(&mut self, size: usize, of: &impl Fn(u32) -> u32) {
-        let before = std::mem::replace(&mut self.places, vec![NONE; size]);
-        for record in before.into_iter().filter(|&r| r != NONE) {
-            let at = self.search(of(record), of);
-            self.places[at] = record;
-        }
-    }
-
-    /// Takes a split out, if it is there.
-    #[inline]
-    pub(super) fn remove(&mut self, split: u32, of: impl Fn(u32) -> u32) {
-        if self.len == 0 {
-            return;
-        }
-        let mut hole = self.search(split, &of);
-        if self.places[hole] == NONE {
-            return;
-        }
-        self.len -= 1;
-        // What comes after it in the run moves up, unless that is before its home.
-        let size = self.places.len();
-        // Around the end as well, without dividing.
-        let distance = |to: usize, from: usize| if to >= from { to - from } else { to + size - from };
-        let mut at = self.next(hole);
-        while self.places[at] != NONE {
-            let home = self.home(of(self.places[at]));
-            if distance(at, home) >= distance(at, hole) {
-                self.places[hole] = self.places[at];
-                hole = at;
+    fn grow(&mut self, at: usize) {
+        let Block { start: from, room, .. } = self.blocks[at];
+        let (from, count, more) = (from as usize, ROOMS[room as usize] as usize, room as usize + 1);
+        let to = match self.free[more] {
+            NONE => {
+                let end = self.pool.len();
+                self.pool.resize(end + ROOMS[more] as usize, NONE);
+                end as u32
             }
-            at = self.next(at);
-        }
-        self.places[hole] = NONE;
+            run => {
+                self.free[more] = self.pool[run as usize];
+                run
+            }
+        };
+        self.pool.copy_within(from..from + count, to as usize);
+        self.leave(at);
+        (self.blocks[at].start, self.blocks[at].room) = (to, more as u8);
     }
 
-    pub(super) fn bytes(&self) -> usize {
-        4 * self.places.capacity()
+    /// Packs the pool anew if it has grown too long.
+    pub(super) fn settle(&mut self) {
+        if self.pool.len() > self.least + self.least / 16 + SPARE {
+            let mut pool = Vec::with_capacity(self.least);
+            for block in &mut self.blocks {
+                let (from, count) = (block.start as usize, block.len());
+                (block.start, block.room) = (pool.len() as u32, FIT[count]);
+                let end = pool.len() + ROOMS[FIT[count] as usize] as usize;
+                pool.extend_from_slice(&self.pool[from..from + count]);
+                pool.resize(end, NONE);
+            }
+            (self.pool, self.free) = (pool, [NONE; ROOMS.len()]);
+        } else if self.pool.capacity() > self.pool.len() + self.pool.len() / 32 + SPARE {
+            self.pool.shrink_to(self.pool.len() + self.pool.len() / 32 + SPARE);
+        }
+    }
+
+    /// Bytes that grow with the set, and bytes of what there is of every split.
+    pub(super) fn bytes(&self) -> (usize, usize) {
+        (4 * self.pool.capacity(), size_of::<Block>() * self.blocks.len())
     }
 }
 
@@ -116,49 +179,67 @@ mod tests {
     use std::collections::HashMap;
 
     #[test]
-    fn it_finds_what_a_map_does() {
-        let mut index = Index::default();
+    fn it_finds_what_a_map_does_and_stays_small() {
+        let mut index = Index::new(3000);
         let mut map: HashMap<u32, u32> = HashMap::new();
-        let mut made: Vec<u32> = Vec::new();
         let mut state = 7u32;
-        for step in 0..40_000u32 {
+        for step in 0..60_000u32 {
             state = state.wrapping_mul(1664525).wrapping_add(1013904223);
             // Up, down, and up again; few numbers, so that most are met again.
-            let (split, up) = ((state >> 8) % 3000, (step / 10_000) % 2 == 0);
-            let of = |r: u32| made[r as usize];
-            assert_eq!(index.find(split, of), map.get(&split).copied().unwrap_or(NONE));
-            if map.contains_key(&split) && (!up || state.is_multiple_of(3)) {
-                index.remove(split, of);
-                map.remove(&split);
-            } else if !map.contains_key(&split) && (up || state.is_multiple_of(3)) {
-                let record = made.len() as u32;
-                made.push(split);
-                index.insert(split, record, |r| made[r as usize]);
-                map.insert(split, record);
+            let (i, up) = ((state >> 8) % 3000, (step / 12_000) % 2 == 0);
+            assert_eq!(index.find(i), map.get(&i).copied().unwrap_or(NONE));
+            assert_eq!(index.has(i), map.contains_key(&i));
+            if map.contains_key(&i) && (!up || state.is_multiple_of(3)) {
+                index.remove(i);
+                map.remove(&i);
+            } else if !map.contains_key(&i) && (up || state.is_multiple_of(3)) {
+                index.insert(i, step);
+                map.insert(i, step);
+            }
+            if step % 777 == 0 {
+                index.settle();
+                let (own, all) = index.bytes();
+                assert!(
+                    own <= 4 * (map.len() + map.len() / 3 + map.len() / 16 + 3 * SPARE),
+                    "{own} {}",
+                    map.len()
+                );
+                assert_eq!(all, 16 * 47);
             }
         }
-        assert!(map.len() > 100 && index.len == map.len());
-        for (&split, &record) in &map {
-            assert_eq!(index.find(split, |r| made[r as usize]), record);
+        assert!(map.len() > 100);
+        assert!((0..3000).all(|i| index.find(i) == map.get(&i).copied().unwrap_or(NONE)));
+        let words: u32 = index.words().map(u64::count_ones).sum();
+        assert_eq!(words as usize, map.len());
+        for i in 0..3000 {
+            if map.contains_key(&i) {
+                index.remove(i);
+            }
+        }
+        index.settle();
+        assert_eq!((index.least, index.pool.len()), (0, 0));
+    }
+
+    #[test]
+    fn rooms_fit() {
+        for (count, &room) in FIT.iter().enumerate() {
+            assert!(ROOMS[room as usize] as usize >= count);
+            assert!(room == 0 || (ROOMS[room as usize - 1] as usize) < count);
         }
     }
 
     #[test]
-    fn it_takes_five_to_seven_bytes_a_split() {
-        let mut index = Index::default();
-        for i in 0..100_000u32 {
-            index.insert(i * 3, i, |r| r * 3);
-            if i % 777 == 0 {
-                index.settle(|r| r * 3);
-                assert!((0..=i).step_by(100).all(|k| index.find(k * 3, |r| r * 3) == k));
+    fn filled_in_order_it_takes_four_to_five_bytes_a_split() {
+        for each in [1, 2, 3, 9] {
+            let mut index = Index::new(100_000);
+            for i in (0..100_000).step_by(each) {
+                index.insert(i, i);
             }
-            if i > 1000 && i % 777 == 0 {
-                assert!(
-                    (19 * i as usize / 4..7 * i as usize + 256).contains(&index.bytes()),
-                    "{i} {}",
-                    index.bytes()
-                );
-            }
+            index.settle();
+            let splits = 100_000 / each;
+            let (own, _) = index.bytes();
+            assert!((4 * splits..5 * splits + 4 * SPARE + 512).contains(&own), "{each}: {own} {splits}");
+            assert!((0..100_000).step_by(each).all(|i| index.find(i) == i));
         }
     }
 }

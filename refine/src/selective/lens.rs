@@ -2,7 +2,7 @@
 
 use super::entry::Entry;
 use crate::hierarchy::{DEPTH, Hierarchy, SplitBounds};
-use crate::view::{Camera, Frustum, Planes};
+use crate::view::{Camera, Frustum, Plane};
 use glam::{DMat3, DMat4, DVec3};
 
 /// What counts as unseen, and is left coarse.
@@ -38,6 +38,8 @@ pub struct Lens {
     /// Pixels.
     pub(super) tau: f64,
     pub(super) frustum: Option<Frustum>,
+    /// Its planes.
+    pub(super) sides: Sides,
     pub(super) back: bool,
     /// About the origin of the bounds.
     pub(super) eye: DVec3,
@@ -100,6 +102,7 @@ impl Lens {
         Ok(Lens {
             tau,
             frustum: matches!(cull, Cull::Frustum | Cull::All).then_some(frustum),
+            sides: Sides::of(&frustum),
             back: matches!(cull, Cull::Cone | Cull::All),
             eye: back.transform_point3(camera.eye()),
             // Normals of the mesh turn with its mirror image.
@@ -205,9 +208,13 @@ impl Lens {
     #[inline]
     pub(crate) fn urgency(&self, e: &Entry) -> f64 {
         let (centre, radius) = (e.centre.as_dvec3(), e.radius as f64);
-        if !self.sees(e, centre, radius) {
-            return 0.0;
-        }
+        if self.sees(e, centre, radius) { self.urgency_seen(e) } else { 0.0 }
+    }
+
+    /// The same of what is seen.
+    #[inline]
+    pub(super) fn urgency_seen(&self, e: &Entry) -> f64 {
+        let (centre, radius) = (e.centre.as_dvec3(), e.radius as f64);
         let size = self.lambda * e.error as f64 * self.counts(e, centre - self.eye, radius);
         size / (self.depth(centre, radius, f64::INFINITY) * self.tau)
     }
@@ -215,24 +222,70 @@ impl Lens {
     /// It may be seen.
     #[inline]
     pub(super) fn sees(&self, e: &Entry, centre: DVec3, radius: f64) -> bool {
-        if self.frustum.is_some_and(|f| f.sphere(centre, radius, Planes::ALL).is_none()) {
+        if self.frustum.is_some() && self.sides.least(centre) < -radius {
             return false;
         }
         if !self.back {
             return true;
         }
-        // As `NormalCone::faces_away_from` and `faces_along`: the least dot product of a direction of the cone with the line of sight.
         let (line, reach) = if self.perspective { (centre - self.eye, radius) } else { (self.look, 0.0) };
         !faces_away(e, line, reach)
     }
 }
 
-/// How far the least dot product of the line with a direction of the cone is above `reach`; nothing if the cone tells nothing, or looks the other way.
+/// The planes of a frustum side by side, so that a place is held against all at once.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sides {
+    origin: DVec3,
+    x: [f64; 6],
+    y: [f64; 6],
+    z: [f64; 6],
+    offset: [f64; 6],
+}
+
+impl Sides {
+    fn of(f: &Frustum) -> Sides {
+        let of = |part: fn(&Plane) -> f64| f.planes().each_ref().map(part);
+        Sides {
+            origin: f.origin(),
+            x: of(|p| p.normal.x),
+            y: of(|p| p.normal.y),
+            z: of(|p| p.normal.z),
+            offset: of(|p| p.offset),
+        }
+    }
+
+    /// The distances from the planes, positive inside.
+    #[inline]
+    pub(super) fn distances(&self, p: DVec3) -> [f64; 6] {
+        let p = p - self.origin;
+        let mut d = [0.0; 6];
+        for (k, d) in d.iter_mut().enumerate() {
+            *d = self.x[k] * p.x + self.y[k] * p.y + self.z[k] * p.z + self.offset[k];
+        }
+        d
+    }
+
+    /// The least distance from a plane.
+    #[inline]
+    fn least(&self, p: DVec3) -> f64 {
+        let [a, b, c, d, e, f] = self.distances(p);
+        a.min(b).min(c.min(d)).min(e.min(f))
+    }
+}
+
+/// As [`crate::view::NormalCone::faces_away_from`] and `faces_along`: how far the least dot product of the line with a direction of the cone is above `reach`; nothing if the cone tells
+/// nothing, or looks the other way.
 #[inline]
 pub(super) fn turned(e: &Entry, line: DVec3, reach: f64) -> Option<f64> {
-    let (axis, cos, sin) = e.cone.unpack_parts();
+    let axis = e.cone.axis()?;
     let along = line.dot(axis);
-    if along <= 0.0 || cos <= 0.0 {
+    if along <= 0.0 {
+        return None;
+    }
+    let along = along / axis.length();
+    let (cos, sin) = e.cone.cos_sin();
+    if cos <= 0.0 {
         return None;
     }
     let across = (line.length_squared() - along * along).max(0.0).sqrt();
@@ -242,6 +295,12 @@ pub(super) fn turned(e: &Entry, line: DVec3, reach: f64) -> Option<f64> {
 /// Nothing of it shows its front.
 #[inline]
 fn faces_away(e: &Entry, line: DVec3, reach: f64) -> bool {
+    // Most do not: told without a root where the line is too short, or the axis looks the other way.
+    let Some(axis) = e.cone.axis() else { return false };
+    let along = line.dot(axis);
+    if along <= 0.0 || along * along < (1.0 - 1e-9) * (reach * reach * axis.length_squared()) {
+        return false;
+    }
     turned(e, line, reach).is_some_and(|above| above >= 0.0)
 }
 

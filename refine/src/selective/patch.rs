@@ -98,7 +98,8 @@ pub(crate) fn split<S: Sheet>(
             }
         }
     }
-    (w..w + new).chain(changed.iter().copied()).for_each(|w| s.touch_wedge(w));
+    (w..w + new).for_each(|w| s.touch_wedge(w));
+    changed.iter().for_each(|&w| s.touch_wedge(w));
     if code.moves() {
         s.touch_vertex(of.vertex, seen_from);
     }
@@ -136,7 +137,7 @@ pub(crate) fn unsplit<S: Sheet>(s: &mut S, of: &Known, [fl, fr]: [u32; 2], expli
     let x_r = if two { s.fans().ends_of(fr, code.right()).0 } else { x_l };
     // The faces of the new vertex lie between the two that go.
     let (mut run, mut entry) = (0, left.inner);
-    while let Some(h) = entry.filter(|h| h.face != fl && h.face != fr) {
+    while let Some(h) = entry.filter(|h| h.face() != fl && h.face() != fr) {
         run += 1;
         entry = s.fans().across(h.turn());
     }
@@ -186,9 +187,9 @@ fn hand_over<S: Sheet>(s: &mut S, first: Option<Half>, count: usize, map: impl F
     let mut entry = first;
     for _ in 0..count {
         let Some(h) = entry else { return };
-        let wedge = &mut s.fans_mut().corners[h.face as usize][h.corner()];
+        let wedge = &mut s.fans_mut().corners[h.face() as usize][h.corner()];
         *wedge = map(*wedge);
-        s.touch(h.face);
+        s.touch(h.face());
         entry = s.fans().across(h.turn());
     }
 }

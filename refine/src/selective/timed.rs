@@ -63,7 +63,7 @@ impl TimedMorph {
             drawn: leader.clone(),
             frames: frames.max(1),
             motions: BTreeMap::new(),
-            led: leader.front.applied_bits().to_vec(),
+            led: leader.front.applied_bits().collect(),
         }
     }
 
@@ -95,7 +95,7 @@ impl TimedMorph {
     /// Takes a step towards `leader`, which must be a view of the same hierarchy and has been adapted to `lenses`. O(splits / 64 + changes + vertices that move).
     pub fn follow(&mut self, leader: &View, lenses: &[Lens]) -> Followed {
         let mut done = Followed::default();
-        let now = leader.front.applied_bits();
+        let now: Vec<u64> = leader.front.applied_bits().collect();
         // Closed sets: ascending, all that a split needs comes before it.
         for i in bits(now.iter().zip(self.drawn.front.applied_bits()).map(|(a, b)| a & !b)) {
             let [vs, vu] = self.ends(i);
@@ -106,7 +106,7 @@ impl TimedMorph {
             done.splits += 1;
         }
         let changed = bits(now.iter().zip(&self.led).map(|(a, b)| a ^ b));
-        self.led.copy_from_slice(now);
+        self.led.copy_from_slice(&now);
         for (v, seen) in self.below(&changed, lenses) {
             self.send(v, seen, leader);
         }

@@ -216,7 +216,7 @@ impl TrulyView {
 
     /// Applies split `i`, which has just been found, and notes the faces around it.
     fn apply_noting(&mut self, i: u32, faces: &mut Vec<u32>) {
-        faces.extend(self.gap.ring.iter().map(|e| self.mesh.face_in()[e.face as usize]));
+        faces.extend(self.gap.ring.iter().map(|e| self.mesh.face_in()[e.face() as usize]));
         let first = self.hierarchy.forest.first_face(i);
         let two = self.hierarchy.mesh().splits.code[i as usize].two_faces();
         faces.extend(first..=first + u32::from(two));

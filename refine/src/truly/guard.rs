@@ -21,8 +21,8 @@ struct Moving {
 impl Moving {
     fn of(mesh: &Mesh, h: &Hierarchy, pieces: &Pieces, e: Half) -> Moving {
         let [x, y] = [mesh.far(e), mesh.far(e.turn())].map(|v| mesh.position(h, v));
-        let own = pieces.looks(mesh.face_in()[e.face as usize]);
-        Moving { x, y, reference: if e.starts { own } else { -own } }
+        let own = pieces.looks(mesh.face_in()[e.face() as usize]);
+        Moving { x, y, reference: if e.starts() { own } else { -own } }
     }
 
     /// It neither turns away nor becomes a sliver when its corner goes from one place to the other, or did before.

@@ -121,7 +121,7 @@ impl Mesh {
     /// The vertex at the other end of an edge.
     #[inline]
     pub(super) fn far(&self, h: Half) -> u32 {
-        self.fans.corners[h.face as usize][h.far_corner()]
+        self.fans.corners[h.face() as usize][h.far_corner()]
     }
 
     /// The faces around the vertex that `start` is seen from, from a border on if there is one; true if they go all around.
@@ -132,7 +132,7 @@ impl Mesh {
         loop {
             ring.push(at);
             match self.fans.across(at.turn()) {
-                Some(h) if h.face == start.face => return true,
+                Some(h) if h.face() == start.face() => return true,
                 Some(h) if ring.len() < most => at = h,
                 _ => break,
             }
@@ -157,7 +157,7 @@ impl Mesh {
         let slot = self.slot_of.get(from as usize).copied().unwrap_or(NONE);
         let corners = self.fans.corners.get(slot as usize);
         let Some(corner) = corners.and_then(|c| c.iter().position(|&v| v == vs)) else { return false };
-        let own = Half { face: slot, edge: corner as u32, starts: true };
+        let own = Half::new(slot, corner as u32, true);
         let closed = self.fan(own, &mut gap.ring);
         let (ring, two) = (&gap.ring, code.two_faces());
         let m = ring.len();
@@ -169,7 +169,7 @@ impl Mesh {
         };
         let Some((x, vl)) = opens_to(pieces.leaf(first, code.left().0)) else { return false };
         let vu = pieces.order(h.forest.base_vertices + i);
-        let goes = |k: usize| pieces.leaf(self.face_in[ring[k].face as usize], ring[k].corner()) >= vu;
+        let goes = |k: usize| pieces.leaf(self.face_in[ring[k].face() as usize], ring[k].corner()) >= vu;
         gap.tips = [vl, NONE];
         let (start, end, forward) = if two {
             let Some((y, vr)) = opens_to(pieces.leaf(first + 1, code.right().0)) else { return false };
@@ -249,7 +249,7 @@ impl Mesh {
             let mut at = from;
             for _ in 0..self.fans.corners.len() {
                 let Some(e) = at else { return false };
-                if own.contains(&e.face) {
+                if own.contains(&e.face()) {
                     return true;
                 }
                 f(e, inner);
@@ -274,7 +274,7 @@ impl Mesh {
         let fr = if code.two_faces() { self.slot_of[face as usize + 1] } else { fl };
         let mut entry = left.inner;
         for _ in 0..self.fans.corners.len() {
-            let Some(e) = entry.filter(|e| e.face != fl && e.face != fr) else { break };
+            let Some(e) = entry.filter(|e| e.face() != fl && e.face() != fr) else { break };
             entry = self.fans.across(e.turn());
             self.hand_over(e, vs);
         }
@@ -296,8 +296,8 @@ impl Mesh {
 
     #[inline]
     fn hand_over(&mut self, e: Half, v: u32) {
-        self.fans.corners[e.face as usize][e.corner()] = v;
-        self.touch(e.face);
+        self.fans.corners[e.face() as usize][e.corner()] = v;
+        self.touch(e.face());
     }
 
     #[inline]

@@ -258,11 +258,11 @@ fn several_fans(faces: &[[u32; 3]], vertices: usize) -> HashMap<u32, Vec<u32>> {
                 if std::mem::replace(&mut seen[f][k], true) {
                     continue;
                 }
-                let own = Half { face: f as u32, edge: k as u32, starts: true };
+                let own = Half::new(f as u32, k as u32, true);
                 for h in [own, own.turn()] {
-                    let link = links[f][h.edge as usize];
+                    let link = links[f][h.edge() as usize];
                     if let Some(o) = crate::progressive::links::across(h, link) {
-                        stack.push((o.face as usize, o.corner()));
+                        stack.push((o.face() as usize, o.corner()));
                     }
                 }
             }
