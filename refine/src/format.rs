@@ -40,6 +40,18 @@ pub use read::{ByteRanges, Piece, PmReader, RangeReader, decode, decode_prefix};
 pub use splits::SplitBlock;
 pub use write::{EncodeError, EncodeOptions, encode};
 
+/// Threads that [`each`] has.
+#[cfg(feature = "parallel")]
+fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
+/// Threads that [`each`] has.
+#[cfg(not(feature = "parallel"))]
+fn threads() -> usize {
+    1
+}
+
 /// `f` of each, in order; on several threads with feature `parallel`.
 #[cfg(feature = "parallel")]
 fn each<T: Send, U: Send>(items: Vec<T>, f: impl Fn(T) -> U + Sync + Send) -> Vec<U> {

@@ -2,7 +2,7 @@
 
 use super::base::MeshHead;
 use super::codec::{self, Sequel};
-use super::container::{Chunk, ChunkType, Directory, FormatError};
+use super::container::{Chunk, ChunkType, Directory, EXPANSION, FormatError};
 use super::input_order;
 use super::places;
 use super::read::Piece;
@@ -82,22 +82,35 @@ impl Assembly {
         self.meshes.get(m as usize)?.as_ref().map(|p| &p.mesh)
     }
 
-    /// Room for what was read already.
-    pub(super) fn reserve<'a>(&mut self, blocks: impl Iterator<Item = (u32, &'a SplitBlock)>) {
+    /// Room for the splits of these chunks of a file of so many bytes, as far as those can hold them.
+    pub(super) fn reserve(&mut self, chunks: &[Chunk], bytes: u64) {
         let mut counts = vec![(0, 0); self.meshes.len()];
-        for (m, block) in blocks {
-            if let Some((splits, moved)) = counts.get_mut(m as usize) {
-                *splits += block.splits.len();
-                *moved += block.moved_positions.len();
+        // A damaged directory may tell of chunks that overlap.
+        let mut most = bytes.saturating_mul(EXPANSION);
+        for chunk in chunks.iter().filter(|c| matches!(c.kind, ChunkType::SPLITS | ChunkType::SEQUEL)) {
+            let (Some(count), Some(Some(part))) =
+                (counts.get_mut(chunk.mesh as usize), self.meshes.get(chunk.mesh as usize))
+            else {
+                continue;
+            };
+            let Some(rest) = most.checked_sub(chunk.raw) else { break };
+            most = rest;
+            // What arrays take in memory is bounded by what is stored.
+            let point = if part.head.double { 24 } else { 12 };
+            let splits =
+                (chunk.count as u64).min(chunk.raw / (18 + point)).min(part.head.splits as u64 - count.0);
+            count.0 += splits;
+            if part.head.channels.is_none() && !part.head.materials && !part.head.groups {
+                count.1 += (chunk.raw - splits * (18 + point)) / point;
             }
         }
-        self.turns.reserve_exact(counts.iter().map(|c| c.0).sum());
+        self.turns.reserve_exact(counts.iter().map(|c| c.0 as usize).sum());
         for (part, (splits, moved)) in self.meshes.iter_mut().zip(counts) {
             if let Some(part) = part {
                 let pm = &mut part.mesh;
-                pm.splits.reserve(splits);
-                places::reserve(&mut pm.new_positions, splits);
-                places::reserve(&mut pm.moved_positions, moved);
+                pm.splits.reserve(splits as usize);
+                places::reserve(&mut pm.new_positions, splits as usize);
+                places::reserve(&mut pm.moved_positions, moved as usize);
             }
         }
     }

@@ -42,6 +42,7 @@ struct Models {
     root: Number,
     split: [[[Bit; 7]; VALENCES]; 5],
     done: [[Bit; 7]; 3],
+    code_same: Bit,
     rest_same: Bit,
     rest: Number,
     moves: Bit,
@@ -77,6 +78,10 @@ struct Codec<'a> {
     extras: Extras,
     m: &'a mut Models,
     ring: Ring,
+    /// Of every edge of the ring where its other end is, seen from its vertex, and the square of its length.
+    around: Vec<[f64; 4]>,
+    /// The sum of the squares of the first of them.
+    squares: f64,
     /// The vertices to be visited in this sweep, the next on top; those of the next sweep.
     pass: Vec<u32>,
     list: Vec<u32>,
@@ -86,7 +91,8 @@ struct Codec<'a> {
     to_come: Vec<u32>,
     /// Splits that only prepare for those of the chunk.
     preparing: bool,
-    rest: u32,
+    /// What is told of the last split's code, and whether it moved its vertex.
+    last_code: (u32, bool),
     /// The least and the largest level.
     levels: [u16; 2],
     /// The next split.
@@ -107,12 +113,14 @@ impl<'a> Codec<'a> {
             extras: Extras::new(head, first.wedge),
             m,
             ring: Ring::default(),
+            around: Vec::new(),
+            squares: 0.0,
             pass: Vec::new(),
             list: Vec::new(),
             moved: true,
             to_come: Vec::new(),
             preparing: false,
-            rest: 0,
+            last_code: (0, false),
             levels: [0; 2],
             split: first.split as u32,
             singles: Singles::new(head),

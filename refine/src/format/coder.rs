@@ -116,11 +116,18 @@ impl Encoder {
         let mut state = LEAST;
         for &(start, size) in self.shares.iter().rev() {
             let size = size as u32;
+            // Dividing by multiplying: this division does not wait for the state, as the next one does for it. At most one too little.
+            let inverse = u64::MAX / (size as u64).max(1);
             if state >> (32 - PRECISION) >= size {
                 words.push(state as u16);
                 state >>= 16;
             }
-            state = ((state / size) << PRECISION) + state % size + start as u32;
+            let mut times = ((state as u128 * inverse as u128) >> 64) as u32;
+            let mut rest = state - times * size;
+            if rest >= size {
+                (times, rest) = (times + 1, rest - size);
+            }
+            state = (times << PRECISION) + rest + start as u32;
         }
         if !self.shares.is_empty() {
             words.extend([state as u16, (state >> 16) as u16]);

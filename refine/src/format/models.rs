@@ -25,8 +25,8 @@ const ENDS: [i32; 2] = [TOTAL as i32 - 32, 32];
 const SEEN: u16 = 126;
 
 /// How slowly a [`Bit`] learns, by how many it has seen: as if it took the mean of them, later of the last 64 or so.
-const SLOWNESS: [u8; SEEN as usize + 1] = {
-    let mut rates = [0; SEEN as usize + 1];
+const SLOWNESS: [u8; 128] = {
+    let mut rates = [0; 128];
     let mut n = 0;
     while n < rates.len() {
         rates[n] = (n as u32 + 2).ilog2() as u8;
@@ -44,7 +44,7 @@ impl Bit {
 
     #[inline(always)]
     pub(super) fn learn(&mut self, bit: bool) {
-        let rate = SLOWNESS[self.seen.min(SEEN) as usize];
+        let rate = SLOWNESS[self.seen as usize & 127];
         self.seen += (self.seen < SEEN) as u16;
         let zero = self.zero as i32;
         self.zero = (zero + ((ENDS[bit as usize] - zero) >> rate)) as u16;
@@ -90,12 +90,12 @@ impl Nibble {
     #[inline(always)]
     pub(super) fn find(&self, slot: u32) -> usize {
         let slot = slot as i16;
-        // All at once, as vectors do it.
-        let mut below = 0i16;
-        for s in &self.start[..16] {
-            below += (*s <= slot) as i16;
-        }
-        (below as usize).wrapping_sub(1) & 15
+        // Halving: less than what it takes to add up what vectors compare.
+        let begins = |k: usize| (self.start[k & 15] <= slot) as usize;
+        let mut k = begins(8) << 3;
+        k |= begins(k | 4) << 2;
+        k |= begins(k | 2) << 1;
+        k | begins(k | 1)
     }
 
     /// Every start moves towards where it were if only `symbol` came and all others kept a share of 1; fast at first.

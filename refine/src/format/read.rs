@@ -73,6 +73,9 @@ pub fn decode(bytes: &[u8]) -> Result<Decoded, FormatError> {
     }
 }
 
+/// Chunks for each thread that are read before they are put together.
+const AT_ONCE: usize = 2;
+
 /// Reads of a file all that is whole: every chunk that is undamaged, as are those it builds on. What a damaged chunk holds, and what needs it, is left out:
 /// with a base the mesh (an empty one stands in its place), with splits all later ones of that mesh, with the scene nothing else. Of a file that is cut off, that is all that came before.
 /// [`super::Report::damage`] is the first damage, [`super::Report::lost`] lists the chunks that were left out.
@@ -105,16 +108,19 @@ pub fn decode_prefix(bytes: &[u8]) -> Result<Decoded, FormatError> {
             Err(e) => note(chunk, e),
         }
     }
-    let pieces = super::each(others, |c| (c, read_piece(c, assembly.head(c.mesh), slice(c))));
-    assembly.reserve(pieces.iter().filter_map(|(c, piece)| match piece {
-        Ok(Piece::Splits(block)) => Some((c.mesh, &**block)),
-        _ => None,
-    }));
-    for (chunk, piece) in pieces {
-        // What follows from damage before has a later place, so the first is what is told.
-        match piece.and_then(|p| assembly.add(chunk, p)) {
-            Ok(()) => sizes.add(chunk, slice(chunk)),
-            Err(e) => note(chunk, e),
+    // A few at a time, so that what was read does not stand in memory twice, and the memory is used again.
+    assembly.reserve(&directory.chunks, bytes.len() as u64);
+    let mut rest = others;
+    while !rest.is_empty() {
+        let later = rest.split_off(rest.len().min(AT_ONCE * super::threads()));
+        let pieces = super::each(rest, |c| (c, read_piece(c, assembly.head(c.mesh), slice(c))));
+        rest = later;
+        for (chunk, piece) in pieces {
+            // What follows from damage before has a later place, so the first is what is told.
+            match piece.and_then(|p| assembly.add(chunk, p)) {
+                Ok(()) => sizes.add(chunk, slice(chunk)),
+                Err(e) => note(chunk, e),
+            }
         }
     }
     if damage.is_none() && bytes.len() as u64 > directory.file_bytes() {

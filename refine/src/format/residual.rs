@@ -28,7 +28,7 @@ impl Guess {
     /// Sets the plane by its normal.
     #[inline(always)]
     pub(super) fn lay(&mut self, normal: [f64; 3]) {
-        let [x, y, z] = normal.map(f64::abs);
+        let [x, y, z] = [normal[0].abs(), normal[1].abs(), normal[2].abs()];
         let last = if x > y && x > z {
             0
         } else if y > z {
@@ -37,8 +37,9 @@ impl Guess {
             2
         };
         self.axes = ORDERS[last];
-        let n = normal[last];
-        self.slope = [normal[0] / n, normal[1] / n, normal[2] / n];
+        let n = 1.0 / normal[last];
+        self.slope = [normal[0] * n, normal[1] * n, normal[2] * n];
+        self.slope[last] = 1.0;
         let flat = self.slope.iter().all(|s| s.abs() <= 1.0);
         if !flat {
             // No plane: all in one place, or too far away.
@@ -68,12 +69,12 @@ const CONTEXTS: usize = 2 * FLAT + STEEP;
 #[derive(Clone, Debug)]
 pub(super) struct Residuals<const KINDS: usize> {
     double: bool,
-    lattices: Vec<(Lattice, i32)>,
+    /// With half octaves of what a step makes, and steps in a unit.
+    lattices: Vec<(Lattice, i32, f64)>,
     on_lattice: [Bit; KINDS],
     second: [Bit; KINDS],
     /// By kind, lattice or none, context, half of the octave.
     length: Vec<[[Nibble; 2]; CONTEXTS]>,
-    top: [Bit; 16],
     far: Number,
 }
 
@@ -85,24 +86,32 @@ pub(super) fn halves(x: f64) -> i32 {
 
 /// Coordinates as integers, such that those that can occur are near each other.
 trait Scale {
-    /// The integer of a coordinate, and half octaves of what a step makes there.
+    /// The integer of an expected coordinate, and half octaves of what a step makes there.
     fn number(&self, axis: usize, x: f64) -> (i64, i32);
+    /// The integer of a coordinate.
+    fn exactly(&self, axis: usize, x: f64) -> i64;
     /// The coordinate.
     fn at(&self, axis: usize, k: i64) -> f64;
     /// A difference.
     fn wrap(&self, x: i64) -> i64;
 }
 
-struct Grid<'a> {
-    lattice: &'a Lattice,
+struct Grid {
+    lattice: Lattice,
     unit: i32,
+    steps: f64,
     double: bool,
 }
 
-impl Scale for Grid<'_> {
+impl Scale for Grid {
+    #[inline(always)]
+    fn exactly(&self, axis: usize, x: f64) -> i64 {
+        self.lattice.nearest(axis, x)
+    }
+
     #[inline(always)]
     fn number(&self, axis: usize, x: f64) -> (i64, i32) {
-        (self.lattice.nearest(axis, x), self.unit)
+        (whole((x - self.lattice.origin[axis]) * self.steps), self.unit)
     }
 
     #[inline(always)]
@@ -121,8 +130,13 @@ struct Single;
 
 impl Scale for Single {
     #[inline(always)]
+    fn exactly(&self, _: usize, x: f64) -> i64 {
+        order32((x as f32).to_bits()) as i64
+    }
+
+    #[inline(always)]
     fn number(&self, _: usize, x: f64) -> (i64, i32) {
-        let bits = (x as f32).to_bits();
+        let bits = (finite(x) as f32).to_bits();
         (order32(bits) as i64, 2 * ((bits >> 23) as i32 & 0xFF) - 300)
     }
 
@@ -141,8 +155,13 @@ struct Double;
 
 impl Scale for Double {
     #[inline(always)]
+    fn exactly(&self, _: usize, x: f64) -> i64 {
+        order64(x.to_bits()) as i64
+    }
+
+    #[inline(always)]
     fn number(&self, _: usize, x: f64) -> (i64, i32) {
-        let bits = x.to_bits();
+        let bits = finite(x).to_bits();
         (order64(bits) as i64, 2 * ((bits >> 52) as i32 & 0x7FF) - 2150)
     }
 
@@ -162,11 +181,13 @@ impl<const KINDS: usize> Residuals<KINDS> {
         let nibbles = [[Nibble::default(); 2]; CONTEXTS];
         Residuals {
             double,
-            lattices: lattices.iter().map(|l| (*l, halves(l.step / l.parts) & !1)).collect(),
+            lattices: lattices
+                .iter()
+                .map(|l| (*l, halves(l.step / l.parts) & !1, l.parts / l.step))
+                .collect(),
             on_lattice: [Bit::default(); KINDS],
             second: [Bit::default(); KINDS],
             length: vec![nibbles; KINDS * (1 + lattices.len())],
-            top: Default::default(),
             far: Number::default(),
         }
     }
@@ -186,15 +207,15 @@ impl<const KINDS: usize> Residuals<KINDS> {
             let found = if C::READS {
                 None
             } else {
-                lattices.iter().position(|(l, _)| l.indices(double, value).is_some())
+                lattices.iter().position(|(l, ..)| l.indices(double, value).is_some())
             };
             if c.bit(&mut self.on_lattice[kind], found.is_some()) {
                 let mut which = found.unwrap_or_default();
                 if self.lattices.len() > 1 {
                     which = c.bit(&mut self.second[kind], which == 1) as usize;
                 }
-                let (lattice, unit) = self.lattices[which];
-                let grid = Grid { lattice: &lattice, unit, double: self.double };
+                let (lattice, unit, steps) = self.lattices[which];
+                let grid = Grid { lattice, unit, steps, double: self.double };
                 return self.three(c, &grid, set + 1 + which, (guess, level), value);
             }
         }
@@ -250,9 +271,8 @@ impl<const KINDS: usize> Residuals<KINDS> {
         (axis, expected, reach): (usize, f64, i32),
         value: f64,
     ) -> f64 {
-        let expected = if expected.abs() < f64::INFINITY { expected } else { 0.0 };
         let (guess, unit) = scale.number(axis, expected);
-        let want = if C::READS { 0 } else { scale.number(axis, value).0 };
+        let want = if C::READS { 0 } else { scale.exactly(axis, value) };
         let residual = scale.wrap(want.wrapping_sub(guess));
         let residual = self.residual(c, context, reach - unit, residual);
         scale.at(axis, guess.wrapping_add(residual))
@@ -275,11 +295,23 @@ impl<const KINDS: usize> Residuals<KINDS> {
         if length <= 1 {
             return unzigzag((length == 1) as u64);
         }
-        let rest = (length as u32).min(64) - 2;
-        let top = c.bit(&mut self.top[symbol as usize & 15], x >> rest & 1 == 1) as u64;
-        let low = c.plain64(rest, x & low_mask(rest));
-        unzigzag((2 | top) << rest | low)
+        let rest = (length as u32).min(64) - 1;
+        unzigzag(1 << rest | c.plain64(rest, x & low_mask(rest)))
     }
+}
+
+/// 0 for what is not.
+#[inline(always)]
+fn finite(x: f64) -> f64 {
+    if x.abs() < f64::INFINITY { x } else { 0.0 }
+}
+
+/// The nearest whole number, the even one of two; 0 where it is not below 2^51.
+#[inline(always)]
+fn whole(x: f64) -> i64 {
+    // From 2^52 on numbers have no fraction: the sum rounds it off, and its low bits are what was added.
+    const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
+    if x.abs() < (1u64 << 51) as f64 { (x + ROUND).to_bits() as i64 - ROUND.to_bits() as i64 } else { 0 }
 }
 
 #[cfg(test)]

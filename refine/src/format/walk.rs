@@ -66,10 +66,14 @@ pub(super) struct Walk {
 /// The edges around a vertex, in turn.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ring {
-    /// Each as the half by which the face behind it is entered, and the vertex at its other end. Of an open ring the last has no face behind it.
-    edges: Vec<(u32, u32)>,
+    /// Each as the half by which the face behind it is entered, and the vertex at its other end. Of an open ring the last has no face behind it. There may be more room than edges.
+    room: Vec<(u32, u32)>,
+    edges: usize,
     pub(super) closed: bool,
 }
+
+/// Edges that there is room for at first.
+const ROOM: usize = 32;
 
 /// An edge of a ring as a cut: as a half of the face that goes to the new vertex and of that which stays, as far as they are there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,24 +95,30 @@ impl Ring {
     /// Edges.
     #[inline]
     pub(super) fn edges(&self) -> usize {
-        self.edges.len()
+        self.edges
+    }
+
+    #[inline]
+    fn all(&self) -> &[(u32, u32)] {
+        self.room.get(..self.edges).unwrap_or_default()
     }
 
     /// Faces.
     #[inline]
     pub(super) fn faces(&self) -> usize {
-        self.edges.len() - !self.closed as usize
+        self.edges - !self.closed as usize
     }
 
     /// Edge `k` as a left cut: the face behind it goes to the new vertex.
     #[inline]
     pub(super) fn left(&self, k: usize) -> Cut {
+        let all = self.all();
         let before = match k {
-            0 if self.closed => self.edges.last().map_or(NONE, |e| turn(e.0)),
+            0 if self.closed => all.last().map_or(NONE, |e| turn(e.0)),
             0 => NONE,
-            _ => turn(self.edges[k - 1].0),
+            _ => turn(all[k - 1].0),
         };
-        Cut { inner: self.edges[k].0, outer: before }
+        Cut { inner: all[k].0, outer: before }
     }
 
     /// The edge `count` faces behind edge `k`, as a right cut.
@@ -121,12 +131,33 @@ impl Ring {
     /// The vertex at the other end of edge `k`, which may be counted once around.
     #[inline]
     pub(super) fn far(&self, k: usize) -> u32 {
-        self.edges[self.around(k)].1
+        self.all()[self.around(k)].1
     }
 
+    /// The vertices at the other ends of all edges.
     #[inline]
-    fn around(&self, k: usize) -> usize {
-        if k >= self.edges.len() { k - self.edges.len() } else { k }
+    pub(super) fn fars(&self) -> impl ExactSizeIterator<Item = u32> + '_ {
+        self.all().iter().map(|e| e.1)
+    }
+
+    /// The edge whose cut is named by half `h`, of a face that is entered by the edge (`entered`) or left by it.
+    #[inline]
+    pub(super) fn position(&self, h: u32, entered: bool) -> Option<usize> {
+        let entry = if entered { h } else { turn(h) };
+        let k = self.all().iter().position(|e| e.0 == entry)? + !entered as usize;
+        Some(if k == self.edges { 0 } else { k })
+    }
+
+    /// The half by which the ring enters a face.
+    #[inline]
+    pub(super) fn entry(&self, face: u32) -> Option<u32> {
+        self.all().iter().map(|e| e.0).find(|&h| h >> 3 == face && h != NONE)
+    }
+
+    /// Edge `k` counted once around.
+    #[inline]
+    pub(super) fn around(&self, k: usize) -> usize {
+        if k >= self.edges { k - self.edges } else { k }
     }
 }
 
@@ -222,7 +253,7 @@ impl Walk {
     /// The vertex at the other end.
     #[inline]
     pub(super) fn far(&self, h: u32) -> u32 {
-        self.faces[(h >> 3) as usize][FAR[(h & 7) as usize] as usize]
+        self.faces[(h >> 3) as usize][FAR[(h & 7) as usize] as usize & 3]
     }
 
     /// The half that `cut` names, seen from `v`.
@@ -241,16 +272,18 @@ impl Walk {
     /// The ring from `start` on; from the border on if there is one. `None` for links that lead astray, as only damage makes them.
     #[inline]
     pub(super) fn ring(&self, start: u32, ring: &mut Ring) -> Option<()> {
-        ring.edges.clear();
         let most = self.faces.len();
-        let mut entry = start;
+        let (faces, mut entry, mut n) = (&self.faces[..], start, 0);
         let exit = loop {
-            if ring.edges.len() > most {
-                return None;
-            }
-            let face = &self.faces[(entry >> 3) as usize];
+            let face = &faces[(entry >> 3) as usize];
             let low = (entry & 7) as usize;
-            ring.edges.push((entry, face[FAR[low] as usize]));
+            let edge = (entry, face[FAR[low] as usize & 3]);
+            match ring.room.get_mut(n) {
+                Some(room) => *room = edge,
+                None if n > most => return None,
+                None => ring.room.resize(2 * n.max(ROOM), edge),
+            }
+            n += 1;
             let exit = TURN[low];
             let link = face[4 + (exit >> 1 & 3) as usize];
             if link == NONE {
@@ -258,27 +291,29 @@ impl Walk {
             }
             entry = link ^ exit & 1;
             if entry == start {
-                ring.closed = true;
+                (ring.closed, ring.edges) = (true, n);
                 return Some(());
             }
         };
         ring.closed = false;
-        ring.edges.push((NONE, self.far(exit)));
-        let (n, mut before) = (ring.edges.len(), start);
+        ring.room.truncate(n);
+        ring.room.push((NONE, self.far(exit)));
+        let (n, mut before) = (ring.room.len(), start);
         loop {
             let exit = self.across(before);
             if exit == NONE {
                 break;
             }
-            if ring.edges.len() > 2 * most + 1 {
+            if ring.room.len() > 2 * most + 1 {
                 return None;
             }
             before = turn(exit);
-            ring.edges.push((before, self.far(before)));
+            ring.room.push((before, self.far(before)));
         }
-        let back = ring.edges.len() - n;
-        ring.edges[n..].reverse();
-        ring.edges.rotate_right(back);
+        let back = ring.room.len() - n;
+        ring.room[n..].reverse();
+        ring.room.rotate_right(back);
+        ring.edges = ring.room.len();
         Some(())
     }
 
@@ -297,11 +332,11 @@ impl Walk {
         let (left, right) = (ring.left(first), ring.right(first, count));
         let tips = [ring.far(first), if two { ring.far(first + count) } else { NONE }];
         for k in first..first + count {
-            let entry = ring.edges[ring.around(k)].0;
+            let entry = ring.all()[ring.around(k)].0;
             if entry == NONE {
                 break;
             }
-            self.face_mut(entry >> 3)[NEAR[(entry & 7) as usize] as usize] = u;
+            self.face_mut(entry >> 3)[NEAR[(entry & 7) as usize] as usize & 3] = u;
         }
         let (l, old, mut at_u) = self.insert(code.left().1, [v, u, tips[0]], left);
         if two {

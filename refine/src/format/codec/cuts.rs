@@ -63,7 +63,7 @@ impl Codec<'_> {
         let (mut rest, mut moves) = (0, false);
         let told = if self.preparing { !ARRANGEMENT } else { TOLD };
         if let Some(w) = wanted {
-            (rest, moves) = ((w.code.0 & !told) as u32, w.code.moves());
+            (rest, moves) = ((w.code.0 & !told) as u32, !self.preparing && w.code.moves());
             want = self.find(two, w);
             if want.is_none() {
                 self.walk.ring(turn(start), &mut self.ring)?;
@@ -71,14 +71,22 @@ impl Codec<'_> {
                 rest |= if want.is_some() { TURNED } else { NAMED };
             }
         }
-        if c.bit(&mut self.m.rest_same, rest == self.rest) {
-            rest = self.rest;
-        } else {
-            rest = u32::try_from(c.number(&mut self.m.rest, rest as u64)).ok()?;
+        if !c.bit(&mut self.m.code_same, (rest, moves) == self.last_code) {
+            let (last, moved) = self.last_code;
+            if !self.preparing {
+                moves = c.bit(&mut self.m.moves, moves);
+            }
+            // What moves otherwise is mostly like it in all else.
+            if moves != moved && c.bit(&mut self.m.rest_same, rest == last) {
+                rest = last;
+            } else {
+                rest = u32::try_from(c.number(&mut self.m.rest, rest as u64)).ok()?;
+            }
+            self.last_code = (rest, moves);
         }
-        self.rest = rest;
+        (rest, moves) = self.last_code;
         let mut code = rest as u16 & !told | if two { SplitCode::TWO_FACES } else { 0 };
-        if !self.preparing && c.bit(&mut self.m.moves, moves) {
+        if moves {
             code |= SplitCode::MOVES;
         }
         let cuts = if rest & NAMED != 0 {
@@ -104,19 +112,27 @@ impl Codec<'_> {
     /// Where in the ring the writer's cuts are.
     fn find(&self, two: bool, wanted: Wanted) -> Option<(usize, usize)> {
         let Wanted { left, right, code, .. } = wanted;
-        let faces = self.ring.faces();
+        let ring = &self.ring;
+        let (faces, edges) = (ring.faces(), ring.edges());
         let left = (left >> 2) << 3 | (left & 3) << 1 | code.left_starts() as u32;
-        let first =
-            (0..self.ring.edges()).find(|&k| self.ring.left(k).name() == (left, code.left_inner()))?;
-        if !two {
-            return (!self.ring.closed).then_some((first, faces - first));
+        let first = ring.position(left, code.left_inner())?;
+        if ring.left(first).name() != (left, code.left_inner()) {
+            return None;
         }
-        let most = if self.ring.closed { faces - 1 } else { faces - first };
-        let count = (1..=most).find(|&k| {
-            let (h, inner) = self.ring.right(first, k).name();
-            cut(h) == right && inner == code.right_inner()
-        })?;
-        Some((first, count))
+        if !two {
+            return (!ring.closed).then_some((first, faces - first));
+        }
+        let most = if ring.closed { faces - 1 } else { faces - first };
+        // The face on the right is left by the cut, or entered by it.
+        let entry = ring.entry(right >> 2)?;
+        let inner = code.right_inner();
+        let at = ring.position(if inner { turn(entry) } else { entry }, !inner)?;
+        let count = if at < first { at + edges - first } else { at - first };
+        let named = |k: usize| {
+            let (h, of) = ring.right(first, k).name();
+            cut(h) == right && of == inner
+        };
+        ((1..=most).contains(&count) && named(count)).then_some((first, count))
     }
 
     /// Cuts by going around the ring, edge by edge. The new vertex is rather where edges are long.
@@ -128,9 +144,10 @@ impl Codec<'_> {
         two: bool,
         want: Option<(usize, usize)>,
     ) -> Option<Cuts> {
+        self.survey(v);
         let ring = &self.ring;
         let (faces, n) = (ring.faces(), ring.edges());
-        let long = self.long(v);
+        let long = self.long();
         let (left, right) = want.unwrap_or_default();
         // The edge before, edge `k`, the edge behind.
         let shape = |k: usize| if k < SEEN { (long >> k & 7) as usize } else { 0 };
@@ -169,28 +186,42 @@ impl Codec<'_> {
 
     /// Which edges of the ring are longer than most: of edge k bit k + 1. Before the first of a closed ring comes the last, behind the last the first.
     #[inline]
-    fn long(&self, v: u32) -> u64 {
-        let (ring, vertices) = (&self.ring, &self.walk.vertices[..]);
-        let t = vertices[v as usize].place;
+    fn long(&self) -> u64 {
+        let ring = &self.ring;
         let edges = ring.edges();
         let n = edges.min(SEEN);
-        let mut squares = [0.0; SEEN];
-        let mut sum = 0.0;
-        for (k, square) in squares.iter_mut().enumerate().take(n) {
-            let p = vertices[ring.far(k) as usize].place;
-            let d = [p[0] - t[0], p[1] - t[1], p[2] - t[2]];
-            *square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            sum += *square;
+        let mean = self.squares / n as f64;
+        // Bit by bit from above, and down at last.
+        let mut long = 0u64;
+        for d in self.around.iter().take(SEEN) {
+            long = long >> 1 | ((d[3] > mean) as u64) << 63;
         }
-        let mean = sum / n as f64;
-        let mut long = 0;
-        for (k, square) in squares[..n].iter().enumerate() {
-            long |= ((*square > mean) as u64) << (k + 1);
-        }
+        long >>= (63 - n) & 63;
         if ring.closed && edges == n {
             long |= long >> n & 1 | (long >> 1 & 1) << (n + 1);
         }
         long
+    }
+
+    /// Measures what lies around vertex `v`, whose ring is at hand: of every edge where its other end is, seen from `v`, and the square of its length.
+    #[inline]
+    pub(super) fn survey(&mut self, v: u32) {
+        let vertices = &self.walk.vertices[..];
+        let t = vertices[v as usize].place;
+        self.around.resize(self.ring.edges(), [0.0; 4]);
+        let mut squares = 0.0;
+        for (to, far) in self.around.iter_mut().zip(self.ring.fars()) {
+            let p = vertices[far as usize].place;
+            let d = [p[0] - t[0], p[1] - t[1], p[2] - t[2]];
+            let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            squares += square;
+            *to = [d[0], d[1], d[2], square];
+        }
+        if self.around.len() > SEEN {
+            squares = 0.0;
+            self.around[..SEEN].iter().for_each(|d| squares += d[3]);
+        }
+        self.squares = squares;
     }
 
     /// Cuts by the numbers of faces: where the vertex has several fans, or the cuts are not named by the later face.
@@ -221,6 +252,7 @@ impl Codec<'_> {
                 | flags(starts, SplitCode::L_STARTS),
         );
         let (first, count) = self.find(two, Wanted { vertex: v, left, right, code })?;
+        self.survey(v);
         Some(Cuts { left: self.ring.left(first), right: self.ring.right(first, count), first, count })
     }
 }

@@ -8,37 +8,47 @@ impl Codec<'_> {
     /// Where the new vertex of a split is expected.
     #[inline]
     pub(super) fn guess(&self, v: u32, cuts: &Cuts, moves: bool) -> Guess {
-        let (ring, vertices) = (&self.ring, &self.walk.vertices[..]);
-        let t = vertices[v as usize].place;
+        let t = self.walk.vertices[v as usize].place;
         let (mut sum, mut reach, mut normal) = ([0.0; 3], [0.0f64; 3], [0.0; 3]);
         let mut last = [0.0; 3];
-        for k in 0..=cuts.count {
-            let p = vertices[ring.far(cuts.first + k) as usize].place;
-            let d = [p[0] - t[0], p[1] - t[1], p[2] - t[2]];
-            for a in 0..3 {
-                sum[a] += p[a];
-                reach[a] = reach[a].max(d[a].abs());
+        let between = self.between(cuts);
+        for part in between {
+            for &[x, y, z, _] in part {
+                let d = [x, y, z];
+                for a in 0..3 {
+                    sum[a] += d[a];
+                    reach[a] = greater(d[a].abs(), reach[a]);
+                }
+                normal[0] += last[1] * z - last[2] * y;
+                normal[1] += last[2] * x - last[0] * z;
+                normal[2] += last[0] * y - last[1] * x;
+                last = d;
             }
-            normal[0] += last[1] * d[2] - last[2] * d[1];
-            normal[1] += last[2] * d[0] - last[0] * d[2];
-            normal[2] += last[0] * d[1] - last[1] * d[0];
-            last = d;
         }
         let n = (cuts.count + 1) as f64;
         // Where both are placed anew the old place is between them: fitted to bunny, horse and igea.
-        let mut at = [0.0; 3];
-        for a in 0..3 {
-            at[a] = if moves { 0.375 * (sum[a] / n) + 0.625 * t[a] } else { (sum[a] + t[a]) / (n + 1.0) };
-        }
-        let mut guess = Guess { at, reach, ..Guess::default() };
+        let share = if moves { 0.375 / n } else { 1.0 / (n + 1.0) };
+        let go = [sum[0] * share, sum[1] * share, sum[2] * share];
+        let mut guess = Guess { at: [t[0] + go[0], t[1] + go[1], t[2] + go[2]], reach, ..Guess::default() };
         guess.lay(normal);
-        let level = guess.off([t[0] - at[0], t[1] - at[1], t[2] - at[2]]);
-        guess.rise = level.abs();
-        for k in 0..=cuts.count {
-            let p = vertices[ring.far(cuts.first + k) as usize].place;
-            guess.rise = guess.rise.max(guess.off([p[0] - at[0], p[1] - at[1], p[2] - at[2]]).abs());
+        let level = guess.off(go);
+        let mut rise = level.abs();
+        for part in between {
+            for &[x, y, z, _] in part {
+                rise = greater((guess.off([x, y, z]) - level).abs(), rise);
+            }
         }
+        guess.rise = rise;
         guess
+    }
+
+    /// What lies around the old vertex, from cut to cut: in two parts, as it may go on behind the ring's last edge.
+    #[inline]
+    fn between(&self, cuts: &Cuts) -> [&[[f64; 4]]; 2] {
+        let all = &self.around[..];
+        let end = cuts.first + cuts.count + 1;
+        let over = end.saturating_sub(all.len());
+        [all.get(cuts.first..end - over).unwrap_or_default(), all.get(..over).unwrap_or_default()]
     }
 
     /// Where the old vertex of a split is expected to go: it stays near, drawn to the neighbours that it keeps.
@@ -67,4 +77,10 @@ impl Codec<'_> {
         }
         Guess { at, ..*guess }
     }
+}
+
+/// The greater of both; `y` where `x` is no number.
+#[inline(always)]
+fn greater(x: f64, y: f64) -> f64 {
+    if x > y { x } else { y }
 }
