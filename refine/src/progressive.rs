@@ -159,6 +159,12 @@ impl SplitCode {
         self.flag(Self::R_TIP_INNER)
     }
 
+    /// Which wedges it makes, as a number: 0 for one, 1 for two, more for what is listed.
+    #[inline]
+    pub(crate) fn kind_code(self) -> u32 {
+        (self.0 >> Self::KIND & 3).into()
+    }
+
     /// Which wedges it makes.
     #[inline]
     pub fn kind(self) -> SplitKind {

@@ -44,19 +44,21 @@ impl Offsets {
         }
     }
 
-    #[inline(always)]
-    fn at(&self, i: usize) -> usize {
-        match self {
-            Offsets::Near(bases, above) => bases[i / NEAR] as usize + above[i] as usize,
-            Offsets::Middle(bases, above) => bases[i / MIDDLE] as usize + above[i] as usize,
-            Offsets::Far(starts) => starts[i] as usize,
-        }
-    }
-
     /// Run `i`.
     #[inline(always)]
     pub(crate) fn run(&self, i: u32) -> Range<usize> {
-        self.at(i as usize)..self.at(i as usize + 1)
+        let (i, j) = (i as usize, i as usize + 1);
+        match self {
+            Offsets::Near(bases, above) => {
+                let at = |i: usize| bases[i / NEAR] as usize + above[i] as usize;
+                at(i)..at(j)
+            }
+            Offsets::Middle(bases, above) => {
+                let at = |i: usize| bases[i / MIDDLE] as usize + above[i] as usize;
+                at(i)..at(j)
+            }
+            Offsets::Far(starts) => starts[i] as usize..starts[j] as usize,
+        }
     }
 
     /// Bytes held.

@@ -47,8 +47,21 @@ impl Rows {
     pub(crate) fn of(&self, pm: &ProgressiveMesh, i: u32) -> SplitRows {
         let k = i as usize;
         let mut at = self.marks[k / EACH];
-        let explicit = pm.wedges.as_ref().map_or(&[][..], |w| &w.explicit);
-        pm.splits.code[k - k % EACH..k].iter().for_each(|&code| at.pass(code, explicit));
+        let codes = &pm.splits.code[k - k % EACH..k];
+        // Mostly none has an entry of its own: then it is sums.
+        let (mut wedges, mut rows, mut plain) = (0, 0, true);
+        for &code in codes {
+            let new = code.kind_code() + 1;
+            wedges += new;
+            rows += new << code.changes_rows() as u32;
+            plain &= new <= 2;
+        }
+        if plain {
+            (at.wedge, at.row) = (at.wedge + wedges, at.row + rows);
+        } else {
+            let explicit = pm.wedges.as_ref().map_or(&[][..], |w| &w.explicit);
+            codes.iter().for_each(|&code| at.pass(code, explicit));
+        }
         at
     }
 
