@@ -423,6 +423,27 @@ fn breaklines_go_through_tiles() {
 }
 
 #[test]
+fn tiles_keep_the_error_between_samples_too() {
+    let p = Place::new();
+    grid(&p, true);
+    for method in ["best", "greedy"] {
+        let made = p.done(&format!(
+            "terrain tin a.asc {method} --max-error 5 --error surface --tiles 2 --tile-format glb --method {method} --verify --json"
+        ));
+        let report = made.json();
+        let verified = &report["verified"];
+        assert_eq!((&report["contract"], &verified["good"]), (&"surface".into(), &true.into()), "{report}");
+        assert!(verified["surface_max"].as_f64().unwrap() > 0.0);
+        assert_eq!(report["tiles"]["border_mismatches"].as_u64(), Some(0));
+        for level in report["tiles"]["levels"].as_array().unwrap() {
+            let of = |name: &str| level[name].as_f64().unwrap();
+            assert!(of("error") <= of("max_error"), "{level}");
+        }
+        assert!(report["error"]["surface"].as_f64().unwrap() <= 5.0);
+    }
+}
+
+#[test]
 fn what_tiles_cannot_be_is_said() {
     let p = Place::new();
     grid(&p, false);
@@ -433,7 +454,6 @@ fn what_tiles_cannot_be_is_said() {
     fails("", 2, "--max-error");
     fails("--max-error 1 --triangles 9", 2, "--triangles");
     fails("--max-error 1 --method regular", 2, "--method best or greedy");
-    fails("--max-error 1 --error surface", 2, "--error samples");
     fails("--max-error 1 --outline-tolerance 1", 2, "--outline-tolerance");
     fails("--max-error 1 --space grid", 2, "--space grid");
     fails("--max-error 1 --png a.png", 2, "--png");

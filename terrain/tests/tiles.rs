@@ -50,7 +50,7 @@ fn collect(tin: &Tin, w: Window, borders: &mut Borders) {
 }
 
 /// Makes all tiles of a level and checks them by other code; the number of triangles.
-fn check(grid: &Grid, level: &Level<'_>, error: f64) -> usize {
+fn check(grid: &Grid, level: &Level<'_>, error: f64, contract: Contract) -> usize {
     let (mut borders, mut triangles) = (Borders::new(), 0);
     let [across, down] = level.cuts().tiles();
     for tile in (0..down).flat_map(|j| (0..across).map(move |i| [i, j])) {
@@ -61,9 +61,12 @@ fn check(grid: &Grid, level: &Level<'_>, error: f64) -> usize {
             assert_eq!(empty.unwrap_err(), TinError::Nothing);
             continue;
         };
-        let verdict = verify(&grid, &own(&tin, window), error, Contract::Samples);
+        let verdict = verify(&grid, &own(&tin, window), error, contract);
         assert!(verdict.is_good() && verdict.exact, "{tile:?}: {verdict:?}");
         assert!((verdict.max_error - errors.max).abs() <= 1e-9 * verdict.max_error.max(1.0));
+        if contract == Contract::Surface {
+            assert!(verdict.surface_error <= errors.surface + 1e-9 * errors.surface.max(1.0));
+        }
         collect(&tin, window, &mut borders);
         triangles += tin.triangles.len();
     }
@@ -87,12 +90,14 @@ proptest! {
         share in prop_oneof![Just(0u32), Just(8), Just(35)],
         tenths in prop_oneof![Just(0u32), 1..300u32],
         kind in 0..3u8,
+        between in any::<bool>(),
     ) {
         let height = |i: usize| if void[i] < share { f64::NAN } else { f64::from(heights[i]) / 10.0 };
         let grid = Grid::new(columns, rows, (0..columns * rows).map(height).collect()).unwrap();
         let error = f64::from(tenths) / 10.0 + 1e-3;
         let method = if kind == 0 { Method::Greedy } else { Method::Best };
-        let options = Options::default().with_method(method).with_on_samples(kind == 1);
+        let contract = if between { Contract::Surface } else { Contract::Samples };
+        let options = Options::default().with_method(method).with_on_samples(kind == 1).with_contract(contract);
         let tiling = match Tiling::new(&grid, &options, 4.0 * error) {
             Ok(tiling) => tiling,
             Err(e) => {
@@ -103,7 +108,7 @@ proptest! {
         let mut cuts = Cuts::even(columns, rows, across);
         for k in 0..3 {
             let error = error * 2f64.powi(k);
-            check(&grid, &tiling.level(cuts.clone(), error).unwrap(), error);
+            check(&grid, &tiling.level(cuts.clone(), error).unwrap(), error, contract);
             cuts = cuts.halved();
         }
     }
@@ -129,7 +134,7 @@ proptest! {
         let options = Options::default().with_method(method).with_breaklines(lines.clone());
         let Ok(tiling) = Tiling::new(&grid, &options, f64::from(error)) else { return Ok(()) };
         let level = tiling.level(Cuts::even(17, 17, across), f64::from(error)).unwrap();
-        check(&grid, &level, f64::from(error));
+        check(&grid, &level, f64::from(error), Contract::Samples);
         let (mut all, mut aside) = (Tin::default(), level.bent());
         for tile in (0..across).flat_map(|j| (0..across).map(move |i| [i, j])) {
             let Some(made) = level.tile(tile, &Quiet).unwrap() else { continue };
@@ -161,7 +166,7 @@ fn tiles_take_few_more_triangles_than_one_network() {
     let options = Options::default().with_max_error(1.0);
     let one = triangulate(&grid, &options, &Quiet).unwrap().tin.triangles.len();
     let tiling = Tiling::new(&grid, &options, 1.0).unwrap();
-    let tiles = check(&grid, &tiling.level(Cuts::even(161, 161, 4), 1.0).unwrap(), 1.0);
+    let tiles = check(&grid, &tiling.level(Cuts::even(161, 161, 4), 1.0).unwrap(), 1.0, Contract::Samples);
     assert!(tiles * 100 < one * 140, "{tiles} instead of {one}");
 }
 
@@ -195,9 +200,9 @@ fn vertices_can_be_spread_evenly() {
     let grid = Grid::new(65, 65, vec![3.0; 65 * 65]).unwrap();
     let tiling = Tiling::new(&grid, &Options::default(), 1.0).unwrap();
     let cuts = Cuts::even(65, 65, 2);
-    assert_eq!(check(&grid, &tiling.level(cuts.clone(), 1.0).unwrap(), 1.0), 8);
+    assert_eq!(check(&grid, &tiling.level(cuts.clone(), 1.0).unwrap(), 1.0, Contract::Samples), 8);
     let spread = tiling.level_with(cuts, 1.0, 8).unwrap();
-    assert_eq!(check(&grid, &spread, 1.0), 2 * 64, "cells of 8 x 8");
+    assert_eq!(check(&grid, &spread, 1.0, Contract::Samples), 2 * 64, "cells of 8 x 8");
     let tin = spread.tile([1, 1], &Quiet).unwrap().unwrap().tin;
     let side = |a: u32, b: u32| {
         let [p, q] = [a, b].map(|v| tin.points[v as usize]);
@@ -225,7 +230,6 @@ fn what_cannot_be_is_said() {
     let grid = hills(9);
     let tiling = |options: Options, error| Tiling::new(&grid, &options, error).map(|_| ()).unwrap_err();
     assert_eq!(tiling(Options::default().with_method(Method::Regular), 1.0), TinError::NoTiles);
-    assert_eq!(tiling(Options::default().with_contract(Contract::Surface), 1.0), TinError::NoTiles);
     assert_eq!(tiling(Options::default().with_outline_tolerance(1.0), 1.0), TinError::NoTiles);
     assert_eq!(tiling(Options::default(), f64::NAN), TinError::BadError);
     let tiling = Tiling::new(&grid, &Options::default(), 1.0).unwrap();

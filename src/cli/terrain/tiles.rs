@@ -172,8 +172,9 @@ impl Job<'_> {
                     borders.add(tin, d.window);
                 }
             }
+            let between = self.options.contract == Contract::Surface;
             let step = geodetic.as_ref().map(|_| quantized_mesh::height_step(work.heights(plan.error)));
-            levels.push(level_report(plan, &done, self.verify.then_some(&borders), step));
+            levels.push(level_report(plan, &done, (self.verify.then_some(&borders), between), step));
             lines.bent = bent + done.iter().map(|d| d.bent).sum::<usize>();
             lines.outside = done.iter().map(|d| d.outside).sum();
             all.push(done);
@@ -425,7 +426,10 @@ impl Work<'_> {
         };
         let extension = if self.geodetic.is_some() { "terrain" } else { "glb" };
         self.staged.write(&name(plan.z, key, extension), &bytes).map_err(Stop::Io)?;
-        let verdict = self.job.verify.then(|| verify(self.grid, window, &made.tin, plan.error));
+        let verdict = self
+            .job
+            .verify
+            .then(|| verify(self.grid, window, &made.tin, (plan.error, self.job.options.contract)));
         let on_globe = matches!(self.space, Space::Globe(_));
         Ok(Some(Done {
             key,
@@ -494,13 +498,13 @@ fn longest(places: &[[f32; 3]], tin: &Tin) -> f64 {
 }
 
 /// The separate check, on the samples of the tile alone.
-fn verify(grid: &Grid, w: Window, tin: &Tin, error: f64) -> Verdict {
+fn verify(grid: &Grid, w: Window, tin: &Tin, (error, contract): (f64, Contract)) -> Verdict {
     let row = |y: usize| &grid.heights()[y * grid.columns() + w.column..][..w.columns];
     let heights = (w.row..w.row + w.rows).flat_map(row).copied().collect();
     let mut own = tin.clone();
     own.points.iter_mut().for_each(|p| *p = [p[0] - w.column as u32, p[1] - w.row as u32]);
     match Grid::new(w.columns, w.rows, heights) {
-        Ok(part) => tin::verify(&part, &own, error, Contract::Samples),
+        Ok(part) => tin::verify(&part, &own, error, contract),
         // The window lies within the grid, so this does not happen.
         Err(_) => Verdict::default(),
     }
@@ -512,6 +516,8 @@ fn sum(verdicts: impl Iterator<Item = Verdict>) -> Verdict {
     all.exact = true;
     for v in verdicts {
         all.max_error = all.max_error.max(v.max_error);
+        all.surface_error = all.surface_error.max(v.surface_error);
+        all.pieces_beyond += v.pieces_beyond;
         all.beyond += v.beyond;
         all.uncovered += v.uncovered;
         all.isolated += v.isolated;
@@ -550,11 +556,17 @@ fn overall(done: &[Done]) -> Errors {
     all
 }
 
-fn level_report(plan: &Plan, done: &[Done], borders: Option<&Borders>, height_step: Option<f64>) -> Level {
+fn level_report(
+    plan: &Plan,
+    done: &[Done],
+    (borders, between): (Option<&Borders>, bool),
+    height_step: Option<f64>,
+) -> Level {
+    let errors = overall(done);
     Level {
         level: plan.z,
         max_error: plan.error,
-        error: overall(done).max,
+        error: if between { errors.surface } else { errors.max },
         tiles: done.len(),
         triangles: done.iter().map(|d| d.triangles).sum(),
         vertices: done.iter().map(|d| d.vertices).sum(),

@@ -307,14 +307,8 @@ impl Args {
         if self.space == Some(SpaceName::Grid) {
             return Err(Failure::Usage("tiles stand in the world: leave out --space grid".into()));
         }
-        if !matches!(self.method, MethodName::Best | MethodName::Greedy)
-            || self.error == ContractName::Surface
-        {
-            return Err(Failure::Usage(
-                "--tiles goes with --method best or greedy and --error samples: a border of tiles knows its own samples only, and what the error is between \
-                 these and those beside it follows from both; --error surface makes one network"
-                    .into(),
-            ));
+        if !matches!(self.method, MethodName::Best | MethodName::Greedy) {
+            return Err(Failure::Usage("--tiles goes with --method best or greedy".into()));
         }
         if self.breaklines.are_given() && self.tile_format == TileFormat::QuantizedMesh {
             return Err(Failure::Usage(

@@ -35,11 +35,22 @@ pub(super) fn greedy(
     let mut mesh = Triangulation::new(field.columns, field.rows);
     region.constrain(&mut mesh);
     let placed = mesh.constrain_lines(lines);
-    refine(field, &mut mesh, goal, control)?;
-    while goal.surface && mend(field, &mut mesh, goal) {
-        refine(field, &mut mesh, goal, control)?;
-    }
+    complete(field, &mut mesh, goal, control)?;
     Some((mesh, placed))
+}
+
+/// Inserts samples into a triangulation that is there until it keeps the tolerance, between samples too if that is asked for. `None` when cancelled.
+pub(super) fn complete(
+    field: &Field,
+    mesh: &mut Triangulation,
+    goal: Goal,
+    control: &dyn Control,
+) -> Option<()> {
+    refine(field, mesh, goal, control)?;
+    while goal.surface && mend(field, mesh, goal) {
+        refine(field, mesh, goal, control)?;
+    }
+    Some(())
 }
 
 /// Inserts a sample beside where a side leaves the tolerance most, for every triangle that has such a side; false if none has.

@@ -225,10 +225,8 @@ pub enum TinError {
     /// A tolerance of the outline that is not a number, or negative.
     #[error("the tolerance of the outline must be a number, 0 or more")]
     BadOutline,
-    /// Tiles of another method than greedy insertion and the best, with an error between samples, or with an outline that is simplified.
-    #[error(
-        "tiles are made by the methods greedy and best, with an error at the samples and the exact outline"
-    )]
+    /// Tiles of another method than greedy insertion and the best, or with an outline that is simplified.
+    #[error("tiles are made by the methods greedy and best, with the exact outline")]
     NoTiles,
     /// Cuts that are not in ascending order from the first to the last sample, or a tile that is none.
     #[error("cuts must ascend from the first column and row to the last, and a tile lie between two of them")]

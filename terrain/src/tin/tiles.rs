@@ -3,14 +3,14 @@
 //! What a border looks like follows from the samples on it, the level's error, where voids lie beside it, and where breaklines reach it; never from
 //! what is inside of a tile. So tiles can be made in any order, on any machine, and fit.
 //!
-//! That is why the error of tiles holds at the samples only. Between them a triangle on a border is judged along every edge of the grid from the
-//! border's samples to those beside it; with long sides on the border and each sample beside it a vertex, no choice of triangles may keep
-//! the error there, and a vertex more on the border would have to be one of the neighbour as well, which does not know these samples.
+//! Where the error holds between the samples too ([`Contract::Surface`]), every sample of a border is a vertex. Otherwise a triangle on a border is judged along
+//! every edge of the grid from the border's samples to those beside it, which the border must not look at: with a long side on the border and any heights beside it,
+//! no choice of triangles keeps the error there. With all of them there is one at least, the grid's own.
 
 use super::breaklines::Placed;
 use super::field::{Field, Tolerance};
 use super::frame::{Frame, Part};
-use super::greedy::{Goal, refine};
+use super::greedy::{Goal, complete};
 use super::line;
 use super::make::{better, breaklines, too_fine};
 use super::network::Network;
@@ -88,12 +88,12 @@ pub struct Tiling<'a> {
 }
 
 impl<'a> Tiling<'a> {
-    /// Tiles by [`Method::Greedy`] or [`Method::Best`], with errors at the samples, none of them above `coarsest`. `options.max_error` and
+    /// Tiles by [`Method::Greedy`] or [`Method::Best`], with errors none of which is above `coarsest`. `options.max_error` and
     /// `options.triangles` are not looked at: [`Tiling::level`] has an error. Breaklines become sides, led over the nearest sample where they
     /// cross borders. O(samples).
     ///
     /// # Errors
-    /// [`TinError`]; [`TinError::NoTiles`] for other methods and contracts, and for an outline that is simplified.
+    /// [`TinError`]; [`TinError::NoTiles`] for other methods, and for an outline that is simplified.
     pub fn new(grid: &'a Grid, options: &Options, coarsest: f64) -> Result<Self, TinError> {
         let (columns, rows) = (grid.columns(), grid.rows());
         if columns.max(rows) > 65_535 || columns * rows >= u32::MAX as usize {
@@ -103,7 +103,7 @@ impl<'a> Tiling<'a> {
             return Err(TinError::BadError);
         }
         let known = matches!(options.method, Method::Greedy | Method::Best);
-        if !known || options.contract != Contract::Samples || options.outline_tolerance.is_some() {
+        if !known || options.outline_tolerance.is_some() {
             return Err(TinError::NoTiles);
         }
         let lines = breaklines(grid, options)?;
@@ -149,7 +149,8 @@ impl<'a> Tiling<'a> {
         }
         let tolerance = self.field.tolerance(error).ok_or_else(|| too_fine(self.grid, &self.field, error))?;
         let spread = spread.clamp(1, 1 << 20);
-        let frame = Frame::new((&self.field, &self.region), cuts, tolerance, spread, &self.lines);
+        let on_cuts = if self.options.contract == Contract::Surface { 1 } else { spread };
+        let frame = Frame::new((&self.field, &self.region), cuts, tolerance, on_cuts, &self.lines);
         Ok(Level { tiling: self, frame, tolerance, spread })
     }
 }
@@ -196,14 +197,15 @@ impl Level<'_> {
             }
         }
         // Samples on borders are within the tolerance of them already, so that none becomes a vertex.
-        let goal = Goal { tolerance: self.tolerance, surface: false, triangles: usize::MAX };
-        refine(&field, &mut mesh, goal, control).ok_or(TinError::Cancelled)?;
-        let mut network = Network::of(&mesh, &field);
         let options = &self.tiling.options;
+        let surface = options.contract == Contract::Surface;
+        let goal = Goal { tolerance: self.tolerance, surface, triangles: usize::MAX };
+        complete(&field, &mut mesh, goal, control).ok_or(TinError::Cancelled)?;
+        let mut network = Network::of(&mesh, &field);
         if options.method == Method::Best {
             let rules = Rules {
                 tolerance: self.tolerance,
-                surface: false,
+                surface,
                 free_heights: !options.on_samples,
                 border_stays: true,
                 spread: Some(spread),
@@ -216,7 +218,7 @@ impl Level<'_> {
             .flat_map(|y| &self.tiling.grid.heights()[y * columns + x0..=y * columns + x1])
             .copied()
             .collect();
-        let errors = network.errors(&field, &heights, false);
+        let errors = network.errors(&field, &heights, surface);
         let tin = network.into_tin(&field, [x0, y0].map(|c| c as u32));
         let (valid, isolated, grid_triangles) = (region.valid, region.isolated, region.triangles);
         Ok(Some(Made { tin, errors, valid, isolated, grid_triangles, bent, outside, ..Made::default() }))
