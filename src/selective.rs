@@ -27,7 +27,7 @@ pub use terrain::{Ground, GroundError, Lap};
 pub use truly::{TrulyScene, TrulySceneError};
 
 use crate::progressive::{Leftover, ProgressiveScene};
-use crate::refine::hierarchy::{Hierarchy, Options};
+use crate::refine::hierarchy::{Guarantee, Hierarchy, Options};
 use crate::refine::progressive::Damage;
 use crate::refine::selective::{Changes, Cull, Done, Lens, LensError, Limits, View};
 use crate::refine::view::Camera;
@@ -50,7 +50,7 @@ pub struct SelectiveScene {
 }
 
 /// How deviations from the finest mesh count in a picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Deviation {
     /// By their length, whichever way they lie.
@@ -58,6 +58,19 @@ pub enum Deviation {
     Uniform,
     /// What lies along the line of sight counts a quarter ([`Lens::directional`]). It takes bounds with directions ([`Options::directions`]).
     Directional,
+    /// Of meshes whose bounds are differences of height ([`Guarantee::Vertical`]), along this direction of the world: by the distance in the picture ([`Lens::upright`]). Of others as uniform.
+    Upright(DVec3),
+}
+
+impl Deviation {
+    /// A lens by which errors of a mesh count so.
+    fn through(self, lens: Lens, camera: &Camera, guarantee: Guarantee) -> Lens {
+        match self {
+            Deviation::Directional => lens.directional(),
+            Deviation::Upright(up) if guarantee == Guarantee::Vertical => lens.upright(camera, up),
+            Deviation::Uniform | Deviation::Upright(_) => lens,
+        }
+    }
 }
 
 /// A mesh of a scene cannot be refined selectively.
@@ -240,7 +253,7 @@ impl SelectiveScene {
             let h = self.views[m].hierarchy();
             let lens = |p: &DMat4| {
                 let lens = Lens::new(h, camera, p, tau, cull)?;
-                Ok(if self.deviation == Deviation::Directional { lens.directional() } else { lens })
+                Ok(self.deviation.through(lens, camera, h.all_bounds().guarantee()))
             };
             shared::lenses(&self.places[m], lens, |source| SelectiveError::Lens { mesh: m, source })
         };

@@ -124,6 +124,24 @@ fn flights_keep_the_tolerance_at_every_sample() {
         // And not by showing everything.
         assert!(r["faces"]["mean"].as_f64().unwrap() < 0.9 * r["full_faces"].as_f64().unwrap());
     }
+    // Looking down at a slant, wide: towards the corners perspective stretches.
+    let camera = |x: f64, y: f64, z: f64| {
+        format!(
+            r#"{{"eye": [{x}, {y}, {z}], "target": [0, 0, 0], "up": [0, 1, 0], "fov_y_deg": 70, "width": 1920, "height": 1080, "near": 0.1, "far": 1e6}}"#
+        )
+    };
+    let info = p.done("info grid.pm --json").json();
+    let at = |k: usize| info["bounds"][k][0].as_f64().unwrap();
+    let size = 1.4 * (at(1) - at(0));
+    let path: Vec<String> = (0..6).map(|k| camera(0.1 * k as f64 * size, 0.4 * size, 0.2 * size)).collect();
+    p.write("down.json", format!("[{}]", path.join(",")));
+    for memory in ["", "--memory 64"] {
+        let fly = format!(
+            "fly grid.pm --grid grid.tif --path down.json --tau 8 --cull frustum --measure-every 1 {memory} --json -q"
+        );
+        let worst = p.done(&fly).json()["measured_over_tau"]["max"].as_f64().unwrap();
+        assert!(worst > 0.3 && worst <= 1.0, "{worst}");
+    }
 }
 
 #[test]

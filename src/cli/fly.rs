@@ -23,7 +23,7 @@ use pace::{Measuring, Setting};
 use path::PathArgs;
 use play::PlayArgs;
 use progmesh::refine::view::Camera;
-use progmesh::selective::{Geomorph, Judge, SelectiveScene};
+use progmesh::selective::{Deviation, Geomorph, Judge, SelectiveScene};
 use report::{Frame, Memory, Report};
 use shots::ShotArgs;
 
@@ -111,6 +111,11 @@ impl Args {
         let source = self.path.open(&mut warnings)?;
         self.needs.rule.check(self.needs.memory.is_some())?;
         self.check_truly()?;
+        if self.path.has_grid() && self.needs.rule.deviation() == Deviation::Directional {
+            return Err(Failure::Usage(
+                "--grid and --error directional do not go together: over a grid what lies above or below a sample counts".into(),
+            ));
+        }
         self.shots.check()?;
         self.play.check()?;
         let interrupt = Interrupt::watch();
@@ -128,6 +133,10 @@ impl Args {
                 (frames, bytes, Some(guard))
             } else {
                 scene.set_geomorph(self.geomorph);
+                if let Some(g) = &course.ground {
+                    // As it is measured.
+                    scene.set_deviation(Deviation::Upright(g.up()));
+                }
                 let (frames, bytes) = self.fly(&mut scene, &course, &interrupt)?;
                 (frames, bytes, None)
             };

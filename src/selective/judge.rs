@@ -115,7 +115,7 @@ impl Judge {
             }
         };
         match self.deviation {
-            Deviation::Uniform => {
+            Deviation::Uniform | Deviation::Upright(_) => {
                 let points: Vec<[f64; 3]> = triangles.as_flattened().iter().map(|p| p.to_array()).collect();
                 let corners = (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
                 let surface = Surface::new(&points[..], &corners.collect::<Vec<[u32; 3]>>())?;

@@ -1,11 +1,12 @@
 //! A scene refined where a camera needs it, of which only what is needed is read.
 
-use super::{places_of, shared};
+use super::{Deviation, places_of, shared};
 use crate::aif::NONE;
 use crate::io::DecodeError;
 use crate::io::grid::ReadAt;
 use crate::io::pm::{self, Extent, Shelled};
 use crate::refine::format::{ByteRanges, ChunkType, FormatError, RangeReader};
+use crate::refine::hierarchy::Guarantee;
 use crate::refine::paged::{PagedDone, PagedError, PagedLimits, PagedView, Traffic};
 use crate::refine::selective::{Cull, LensError, Limits};
 use crate::refine::view::Camera;
@@ -71,6 +72,7 @@ pub struct PagedScene {
     views: Vec<PagedView<Ranges>>,
     places: Vec<Vec<DMat4>>,
     boxes: Vec<Option<Extent>>,
+    deviation: Deviation,
     limit: usize,
     file_bytes: u64,
     shell_bytes: u64,
@@ -107,12 +109,27 @@ impl PagedScene {
             views.push(view);
         }
         let places = places_of(&shell, meshes);
-        Ok(PagedScene { shell, views, places, boxes, limit, file_bytes, shell_bytes, chunks })
+        Ok(PagedScene {
+            shell,
+            views,
+            places,
+            boxes,
+            deviation: Deviation::Uniform,
+            limit,
+            file_bytes,
+            shell_bytes,
+            chunks,
+        })
     }
 
     /// The views, one a mesh.
     pub fn views(&self) -> &[PagedView<Ranges>] {
         &self.views
+    }
+
+    /// How errors count from the next frame on. [`Deviation::Upright`] is for files whose bounds are differences of height, as those of terrain are: it is not looked after here. Directions are not known.
+    pub fn set_deviation(&mut self, deviation: Deviation) {
+        self.deviation = deviation;
     }
 
     /// Faces shown, of all meshes, each counted once.
@@ -217,7 +234,11 @@ impl PagedScene {
     ) -> Result<PagedDone, PagedSceneError> {
         let mut all = PagedDone::NOTHING;
         for mesh in 0..self.views.len() {
-            let lens = |p: &DMat4| self.views[mesh].lens(camera, p, tau, cull);
+            let lens = |p: &DMat4| {
+                let lens = self.views[mesh].lens(camera, p, tau, cull)?;
+                // Bounds of other kinds are not along it: who sets it knows.
+                Ok(self.deviation.through(lens, camera, Guarantee::Vertical))
+            };
             let failed = |source| PagedSceneError::Lens { mesh, source };
             let lenses = shared::lenses(&self.places[mesh], lens, failed)?;
             let others = self.face_count() - self.views[mesh].face_count();

@@ -92,8 +92,9 @@ impl Pace {
         if !same {
             return None;
         }
-        let finer = (b.lambda / bt) / (a.lambda / at);
-        let by_tau = if (a.lambda, at) == (b.lambda, bt) { 0.0 } else { finer.ln().abs() * self.per_tau };
+        let (a_scale, b_scale) = (a.scale(at), b.scale(bt));
+        let finer = (b_scale / bt) / (a_scale / at);
+        let by_tau = if (a_scale, at) == (b_scale, bt) { 0.0 } else { finer.ln().abs() * self.per_tau };
         // Of f(p) = n . (p - o) + d.
         let linear = |(n, o, d): (glam::DVec3, glam::DVec3, f64),
                       (n2, o2, d2): (glam::DVec3, glam::DVec3, f64)| {
@@ -153,7 +154,9 @@ impl Clock {
         for (a, b) in self.lenses.iter().zip(lenses) {
             let coarse = (self.keep, keep);
             let (a, b) = ((a, a.tau), (b, b.tau));
-            if (a.1, a.0.lambda, coarse.0) != (b.1, b.0.lambda, coarse.1) && self.pace.per_tau.is_infinite() {
+            if (a.1, a.0.scale(a.1), coarse.0) != (b.1, b.0.scale(b.1), coarse.1)
+                && self.pace.per_tau.is_infinite()
+            {
                 // From now on such changes are expected.
                 self.pace.per_tau = self.pace.diagonal;
                 return None;
@@ -207,7 +210,7 @@ impl Lens {
             if tau == f64::INFINITY {
                 return Verdict { wanted: false, slack };
             }
-            let all = self.lambda * e.error as f64 / tau;
+            let all = self.scale(tau) * e.error as f64 / tau;
             let fine = all * self.counts(e, line, radius);
             // By e^x - 1 <= 1.3 x for what the clock reaches, 0.25.
             let grows = if pace.per_tau.is_finite() { 1.3 * all / pace.per_tau } else { 0.0 };
@@ -410,8 +413,14 @@ mod tests {
                 far: 20.0,
             });
             let placed = DMat4::from_scale(DVec3::splat(1.7));
-            let lens = Lens::about(DVec3::ZERO, &c.unwrap(), &placed, self.tau, cull).unwrap();
-            if self.directional { lens.directional() } else { lens }
+            let c = c.unwrap();
+            let lens = Lens::about(DVec3::ZERO, &c, &placed, self.tau, cull).unwrap();
+            // Some by where they lie to the line of sight, some of these along a line of the world too.
+            match (self.directional, cull) {
+                (true, Cull::Cone) => lens.directional().upright(&c, DVec3::new(0.6, 0.8, 0.0)),
+                (true, _) => lens.directional(),
+                _ => lens,
+            }
         }
 
         fn moved(&self, r: &mut Random, step: f64) -> Pose {

@@ -3,7 +3,7 @@
 use super::entry::Entry;
 use crate::hierarchy::{DEPTH, Hierarchy, SplitBounds};
 use crate::view::{Camera, Frustum, Plane};
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec2, DVec3};
 
 /// What counts as unseen, and is left coarse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -57,7 +57,12 @@ pub struct Lens {
     pub(super) directional: bool,
     /// The mesh is placed without changing its angles.
     similar: bool,
+    /// Depth that a length of the mesh may take away from what it belongs to, if its way is known.
+    lift: f64,
 }
+
+/// Of a length seen along itself so much counts: scales must have a quotient.
+const LEAST: f64 = 1e-6;
 
 impl Lens {
     /// For a mesh that stands where `placed` puts it (the identity: where its coordinates say), seen by `camera`, with errors up to `tau` pixels.
@@ -115,7 +120,36 @@ impl Lens {
             perspective: camera.is_perspective(),
             directional: false,
             similar: most <= least * (1.0 + 1e-6),
+            lift: 0.0,
         })
+    }
+
+    /// The same for errors that are differences along a known direction of the world, `up` (terrain: heights), as `camera` sees them: then the *distance in the picture* between a place of the finest mesh and that of what is shown above
+    /// or below it is at most the tolerance, exactly, wherever in the picture it is. (lambda * error / depth is less than that towards the corners, where perspective stretches, if the camera looks up or down.)
+    ///
+    /// For a place p in the frustum at depth z, (a, b) = p / z in the picture, and q = p + e u, with u in the camera's axes: q / q_z - p / z = e ((u_x, u_y) - (a, b) u_z) / (z + e u_z). The numerator is convex in (a, b), so it is
+    /// largest in a corner of the picture; with k its length there, the distance is at most tau if e (lambda k + tau |u_z|) <= tau z.
+    pub fn upright(self, camera: &Camera, up: DVec3) -> Lens {
+        let up = up.normalize_or_zero();
+        let u = DVec3::new(camera.right().dot(up), camera.up().dot(up), camera.look().dot(up));
+        if !self.perspective {
+            return Lens { lambda: self.lambda * u.truncate().length().max(LEAST), ..self };
+        }
+        let corner = 0.5 * DVec2::new(camera.width() as f64, camera.height() as f64) / camera.pixel_scale();
+        let corners = [corner, corner * DVec2::new(-1.0, 1.0)];
+        let stretch = corners.iter().flat_map(|&c| [c, -c]).map(|c| (u.truncate() - c * u.z).length());
+        // In steps of 1 %, upwards: every change makes decisions fall that would stand.
+        let steps = 64.0;
+        let most = ((stretch.fold(LEAST, f64::max).log2() * steps).ceil() / steps).exp2();
+        let lift = self.lambda / camera.pixel_scale() * ((u.z.abs() * steps).ceil() / steps);
+        Lens { lambda: self.lambda * most, lift, ..self }
+    }
+
+    /// What an error of 1 takes up at depth 1, where `tau` is allowed.
+    #[inline]
+    pub(super) fn scale(&self, tau: f64) -> f64 {
+        // An infinite tolerance times nothing is no number.
+        if self.lift > 0.0 && tau.is_finite() { self.lambda + tau * self.lift } else { self.lambda }
     }
 
     /// The same with *directional* errors: what deviates along the line of sight counts a quarter, as it hardly shows. Where the finest mesh has a place p, what is shown has a place q near it such that lambda /
@@ -144,7 +178,7 @@ impl Lens {
     /// How many pixels the error of a split may take up, at most, wherever in its sphere and whichever way it is; a bound that never grows from a split to those below.
     pub fn pixels(&self, hierarchy: &Hierarchy, b: &SplitBounds) -> f64 {
         let centre = b.centre - hierarchy.bounds.origin;
-        self.lambda * b.error / self.depth(centre, b.radius, f64::INFINITY)
+        self.scale(self.tau) * b.error / self.depth(centre, b.radius, f64::INFINITY)
     }
 
     /// True if the split is needed: it may be seen, and its error may take up the tolerance or more.
@@ -172,7 +206,7 @@ impl Lens {
     #[inline]
     pub(crate) fn wants(&self, e: &Entry, tau: f64) -> bool {
         let (centre, radius) = (e.centre.as_dvec3(), e.radius as f64);
-        let size = self.lambda * e.error as f64;
+        let size = self.scale(tau) * e.error as f64;
         // Depth beyond which it is fine enough; 0 / 0 is not.
         if tau > 0.0 {
             let fine = size / tau;
@@ -215,7 +249,7 @@ impl Lens {
     #[inline]
     pub(super) fn urgency_seen(&self, e: &Entry) -> f64 {
         let (centre, radius) = (e.centre.as_dvec3(), e.radius as f64);
-        let size = self.lambda * e.error as f64 * self.counts(e, centre - self.eye, radius);
+        let size = self.scale(self.tau) * e.error as f64 * self.counts(e, centre - self.eye, radius);
         size / (self.depth(centre, radius, f64::INFINITY) * self.tau)
     }
 
@@ -326,6 +360,7 @@ fn stretch(m: &DMat3) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::view::{CameraParameters, Projection};
 
     #[test]
     fn a_matrix_stretches_by_its_singular_values() {
@@ -335,5 +370,56 @@ mod tests {
         assert!((least - 0.25).abs() < 1e-6 && (most - 3.0).abs() < 1e-6, "{least} {most}");
         let (least, most) = stretch(&DMat3::from_diagonal(DVec3::splat(2.0)));
         assert!((least - 2.0).abs() < 1e-6 && (most - 2.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn upright_errors_are_distances_in_the_picture() {
+        let mut state = 11u64;
+        let mut unit = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as f64 / (1u64 << 31) as f64
+        };
+        let (mut tight, mut plain_fails) = (0.0f64, 0);
+        for round in 0..400 {
+            let mut vector = || DVec3::new(unit(), unit(), unit()) * 2.0 - 1.0;
+            let (eye, target, up, roll) = (vector(), vector(), vector().normalize(), vector());
+            let projection = match round % 4 {
+                0 => Projection::Orthographic { ortho_height: 2.0 },
+                _ => Projection::Perspective { fov_y_deg: 30.0 + 60.0 * unit() },
+            };
+            let of = CameraParameters {
+                eye,
+                target,
+                up: roll,
+                projection,
+                width: 160,
+                height: 90,
+                near: 1e-3,
+                far: 50.0,
+            };
+            let Ok(camera) = Camera::new(&of) else { continue };
+            let tau = 0.2 + 4.0 * unit();
+            let plain = Lens::about(DVec3::ZERO, &camera, &DMat4::IDENTITY, tau, Cull::All).unwrap();
+            let lens = plain.upright(&camera, up);
+            for _ in 0..50 {
+                let z = 0.05 + 3.0 * unit();
+                let at = |t: f64, side: u32| (2.0 * t - 1.0) * 0.5 * side as f64 / camera.pixel_scale();
+                let depth = if camera.is_perspective() { z } else { 1.0 };
+                let (a, b) = (at(unit(), 160), at(unit(), 90));
+                let p = eye + camera.look() * z + (camera.right() * a + camera.up() * b) * depth;
+                let picture = |e: f64| {
+                    let there = |q: DVec3| camera.project(q).map(|(at, _)| at);
+                    there(p).zip(there(p + up * e)).map_or(f64::INFINITY, |(a, b)| a.distance(b))
+                };
+                // The largest errors that are let through.
+                for sign in [-1.0, 1.0] {
+                    let e = sign * tau * depth / lens.scale(tau) * (1.0 - 1e-9);
+                    assert!(picture(e) <= tau, "round {round}: {} above {tau}", picture(e));
+                    tight = tight.max(picture(e) / tau);
+                    plain_fails += usize::from(picture(sign * tau * depth / plain.scale(tau)) > tau);
+                }
+            }
+        }
+        assert!(tight > 0.98 && plain_fails > 100, "{tight} {plain_fails}");
     }
 }

@@ -10,7 +10,7 @@ use super::pace::{Measuring, Pace};
 use super::path::{Course, Source};
 use super::report::{Frame, Memory, Report};
 use progmesh::refine::paged::PagedLimits;
-use progmesh::selective::{Judge, PagedScene};
+use progmesh::selective::{Deviation, Judge, PagedScene};
 use std::time::Instant;
 
 impl Args {
@@ -31,6 +31,10 @@ impl Args {
         let mut scene = paging::open(&self.input, mib)?;
         let read = start.elapsed().as_secs_f64();
         let course = self.path.lay(source, scene.bounds(), (&file, self.terrain()))?;
+        if let Some(g) = course.ground.as_ref().filter(|_| self.terrain().is_some()) {
+            // As it is measured.
+            scene.set_deviation(Deviation::Upright(g.up()));
+        }
         let mut most = scene.bytes();
         let frames = self.fly_paged(&mut scene, &course, interrupt, &mut most)?;
         self.something_seen(&frames, scene.bounds())?;

@@ -95,6 +95,11 @@ fn speed(text: &str) -> Result<Speed, String> {
 }
 
 impl PathArgs {
+    /// There is a grid to measure against.
+    pub(super) fn has_grid(&self) -> bool {
+        self.grid.is_some()
+    }
+
     /// As given.
     pub(super) fn name(&self) -> &str {
         &self.path
