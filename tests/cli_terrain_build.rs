@@ -172,6 +172,26 @@ fn with_a_floor_the_bound_is_the_larger_of_it_and_the_tolerance() {
 }
 
 #[test]
+fn cameras_that_look_down_are_shown_no_more_than_the_tolerance_either() {
+    let p = Place::new();
+    p.done("generate terrain grid.tif --size 129 --seed 3 -q");
+    p.done("terrain build grid.tif grid.pm --block 32 -q");
+    // Down by 20 to 70 degrees, with the picture's corners far off the axis.
+    let line = |k: u32| {
+        let (sin, cos) = (0.35 + 0.17 * f64::from(k)).sin_cos();
+        let eye = [0.1 + 0.1 * f64::from(k), 0.5, 0.35];
+        format!("F {k} {cos} 0 {} 0 1 0 {sin} 0 {cos} {} {} {} 1\nf 0 0 0\n", -sin, eye[0], eye[1], eye[2])
+    };
+    p.write("down.frames", (0..6).map(line).collect::<String>());
+    for more in ["", " --memory 64"] {
+        let fly = "fly grid.pm --grid grid.tif --path down.frames --tau 2 --cull frustum --measure-every 1";
+        let r = p.done(&format!("{fly} --json -q{more}")).json();
+        assert_eq!(r["above"].as_u64(), Some(0), "{}", r["measured_over_tau"]);
+        assert!(r["measured_over_tau"]["p50"].as_f64().unwrap() > 0.5, "{}", r["measured_over_tau"]);
+    }
+}
+
+#[test]
 fn what_cannot_be_built_is_said() {
     let p = place(false);
     p.run(&format!("terrain build hills.raw hills.ply {RAW}")).failed(2, "must end in .pm");

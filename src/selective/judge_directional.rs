@@ -156,7 +156,8 @@ mod tests {
         let front = [DVec3::new(-1.0, -1.0, 0.0), DVec3::new(1.0, -1.0, 0.0), DVec3::new(0.0, 2.0, 0.0)];
         let tree = Spheres::new(&[front]).unwrap();
         assert!((tree.least(DVec3::new(0.0, 0.0, -0.8), DVec3::NEG_Z) - 0.2).abs() < 1e-12);
-        assert!((tree.least(DVec3::new(0.0, 0.0, -0.8), DVec3::X) - 0.5).abs() < 0.3);
+        // From the side, all is across it.
+        assert!((tree.least(DVec3::new(0.0, 0.0, -0.8), DVec3::X) - 0.8).abs() < 1e-12);
         assert!(Spheres::new(&[]).is_err() && Spheres::new(&[[DVec3::NAN; 3]]).is_err());
     }
 }
