@@ -317,20 +317,24 @@ fn in_region(valid: &mut impl FnMut(i64, i64) -> bool, x: usize, y: usize) -> bo
 
 /// The edge runs along sides of the grid's triangles that have a valid triangle on one side only.
 fn on_outline(valid: &mut impl FnMut(i64, i64) -> bool, [a, b]: [DVec3; 2]) -> bool {
-    let sample = |p: DVec3| {
-        let (x, y) = (p.x.round(), p.y.round());
-        let near = (p.x - x).abs() <= AT_SAMPLE && (p.y - y).abs() <= AT_SAMPLE;
-        (near && x.abs() < 1e9 && y.abs() < 1e9).then_some((x as i64, y as i64))
+    // Along a row, a column or a diagonal of the cells; not along the other diagonal. Ends may lie between samples: vertices on their way (geomorphs) do.
+    let same = |s: f64, t: f64| {
+        let k = s.round();
+        ((s - k).abs() <= AT_SAMPLE && (t - k).abs() <= AT_SAMPLE && k.abs() < 1e9).then_some(k as i64)
     };
-    let (Some((x0, y0)), Some((x1, y1))) = (sample(a), sample(b)) else { return false };
-    let steps = (x1 - x0).abs().max((y1 - y0).abs());
-    let (dx, dy) = ((x1 - x0).signum(), (y1 - y0).signum());
-    // Along a row, a column or a diagonal of the cells; not along the other diagonal.
-    if steps == 0 || (x1 - x0, y1 - y0) != (dx * steps, dy * steps) || dx * dy < 0 {
-        return false;
-    }
-    (0..steps).all(|k| {
-        let (x, y) = (x0 + k * dx + dx.min(0), y0 + k * dy + dy.min(0));
+    let cells = |s: f64, t: f64| {
+        let (from, to) = ((s.min(t) + AT_SAMPLE).floor(), (s.max(t) - AT_SAMPLE).ceil());
+        (s != t && from.abs() < 1e9 && to.abs() < 1e9).then_some(from as i64..to.max(from + 1.0) as i64)
+    };
+    let (steps, x0, y0, dx, dy) = match (same(a.y, b.y), same(a.x, b.x), same(a.x - a.y, b.x - b.y)) {
+        (Some(y), _, _) => (cells(a.x, b.x), 0, y, 1, 0),
+        (_, Some(x), _) => (cells(a.y, b.y), x, 0, 0, 1),
+        (_, _, Some(x)) => (cells(a.y, b.y), x, 0, 1, 1),
+        _ => return false,
+    };
+    let Some(mut steps) = steps else { return false };
+    steps.all(|k| {
+        let (x, y) = (x0 + k * dx, y0 + k * dy);
         let sides = match (dx != 0, dy != 0) {
             (true, false) => [whole(valid, x, y, false), whole(valid, x, y - 1, true)],
             (false, true) => [whole(valid, x, y, true), whole(valid, x - 1, y, false)],
@@ -476,6 +480,27 @@ mod tests {
                 ground.seams(&rest).unwrap().cracks
             });
         assert!(at_corner.is_none_or(|n| n > 0));
+    }
+
+    #[test]
+    fn sides_of_the_outline_may_end_between_samples() {
+        // Nine samples without the one at the upper right.
+        let mut valid = |x: i64, y: i64| (0..3).contains(&x) && (0..3).contains(&y) && (x, y) != (2, 0);
+        let mut on = |a: [f64; 2], b: [f64; 2]| {
+            let [a, b] = [a, b].map(|[x, y]| DVec3::new(x, y, 7.0));
+            let is = on_outline(&mut valid, [a, b]);
+            assert_eq!(is, on_outline(&mut valid, [b, a]));
+            is
+        };
+        assert!(on([0.0, 0.0], [0.0, 2.0]) && on([0.0, 0.3], [0.0, 1.6]) && on([0.25, 2.0], [2.0, 2.0]));
+        assert!(on([0.0, 0.0], [1.0, 0.0]) && on([1.0, 0.0], [2.0, 1.0]) && on([1.25, 0.25], [1.5, 0.5]));
+        assert!(!on([0.0, 0.0], [1.5, 0.0]) && !on([1.0, 0.0], [1.0, 1.0]) && !on([0.5, 0.5], [1.5, 1.5]));
+        assert!(!on([0.0, 0.1], [1.0, 0.1]) && !on([0.0, 1.0], [1.0, 0.0]) && !on([0.0, 0.5], [0.0, 0.5]));
+        assert!(
+            !on([0.0, 2.0], [0.0, 2.5])
+                && !on([f64::NAN, 0.0], [0.0, f64::NAN])
+                && !on([1e300, 0.0], [0.0, 0.0])
+        );
     }
 
     fn valid_in(grid: &Grid, x: i64, y: i64) -> bool {
