@@ -298,10 +298,10 @@ fn in_rows(layout: &Layout, level: u32) -> Vec<[usize; 2]> {
 }
 
 /// `f` of each, in order; on several threads with feature `parallel`. The first error in order.
-fn each<T: Sync, U: Send>(
+pub(crate) fn each<T: Sync, U: Send, E: Send>(
     all: &[T],
-    f: impl Fn(&T) -> Result<U, BuildError> + Sync,
-) -> Result<Vec<U>, BuildError> {
+    f: impl Fn(&T) -> Result<U, E> + Sync,
+) -> Result<Vec<U>, E> {
     #[cfg(feature = "parallel")]
     {
         use rayon::prelude::*;

@@ -61,6 +61,24 @@ pub enum Encoding {
     I32,
 }
 
+impl Encoding {
+    /// All of them, in the order that `.pm` files number them in: new ones come last.
+    pub const ALL: [Encoding; 12] = [
+        Encoding::F32,
+        Encoding::F64,
+        Encoding::U8,
+        Encoding::U8Norm,
+        Encoding::I8,
+        Encoding::I8Norm,
+        Encoding::U16,
+        Encoding::U16Norm,
+        Encoding::I16,
+        Encoding::I16Norm,
+        Encoding::U32,
+        Encoding::I32,
+    ];
+}
+
 /// One attribute: its meaning, how many numbers it takes, how it was stored.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Channel {

@@ -134,7 +134,7 @@ impl Run<'_> {
                 let one = |(at, numbers): &([usize; 2], Numbers)| {
                     let mut path = of.clone();
                     self.visit(&mut path, level - 1, *at, numbers)?;
-                    Ok(numbers.vertices.iter().map(|&v| (v, path.next(v))).collect::<Vec<_>>())
+                    Ok::<Vec<_>, BuildError>(numbers.vertices.iter().map(|&v| (v, path.next(v))).collect())
                 };
                 for (v, next) in super::each(&below, one)?.into_iter().flatten() {
                     path.set_next(v, next);

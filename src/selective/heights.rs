@@ -2,6 +2,7 @@
 
 use super::samples::Validity;
 use super::terrain::Ground;
+use crate::blocks::each;
 use crate::refine::view::{Camera, Frustum, Planes};
 use crate::terrain::{RasterError, Window};
 use glam::DVec3;
@@ -232,21 +233,6 @@ impl Ground<'_> {
         validity.done()?;
         Ok(Seams { cracks: open, folds })
     }
-}
-
-/// `f` of each, in order; on several threads with feature `parallel`. The first error in order.
-fn each<T: Sync, U: Send>(
-    all: &[T],
-    f: impl Fn(&T) -> Result<U, RasterError> + Sync,
-) -> Result<Vec<U>, RasterError> {
-    #[cfg(feature = "parallel")]
-    {
-        use rayon::prelude::*;
-        let results: Vec<_> = all.par_iter().with_max_len(1).map(&f).collect();
-        results.into_iter().collect()
-    }
-    #[cfg(not(feature = "parallel"))]
-    all.iter().map(f).collect()
 }
 
 /// The samples of a range that a triangle with these coordinates may reach.

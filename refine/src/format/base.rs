@@ -237,24 +237,9 @@ fn write_channel(c: &Channel, out: &mut Vec<u8>) {
         out.extend_from_slice(name.as_bytes());
     }
     put_varint(out, c.width as u64);
-    let encoding = ENCODINGS.iter().position(|&e| e == c.encoding).unwrap_or(0);
+    let encoding = Encoding::ALL.iter().position(|&e| e == c.encoding).unwrap_or(0);
     out.push(encoding as u8);
 }
-
-const ENCODINGS: [Encoding; 12] = [
-    Encoding::F32,
-    Encoding::F64,
-    Encoding::U8,
-    Encoding::U8Norm,
-    Encoding::I8,
-    Encoding::I8Norm,
-    Encoding::U16,
-    Encoding::U16Norm,
-    Encoding::I16,
-    Encoding::I16Norm,
-    Encoding::U32,
-    Encoding::I32,
-];
 
 /// The widest channel taken: a row of 64 of them still is small.
 const WIDEST: u64 = 1 << 12;
@@ -281,7 +266,7 @@ fn read_channel(from: &mut &[u8]) -> Option<Channel> {
         _ => return None,
     };
     let width = take_varint(from)?;
-    let &encoding = ENCODINGS.get(take_byte(from)? as usize)?;
+    let &encoding = Encoding::ALL.get(take_byte(from)? as usize)?;
     Some(Channel { semantic, width: usize::try_from(width).ok().filter(|_| width <= WIDEST)?, encoding })
 }
 

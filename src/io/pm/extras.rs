@@ -36,22 +36,6 @@ struct Column {
     values: Span,
 }
 
-/// How the formats number them.
-const ENCODINGS: [Encoding; 12] = [
-    Encoding::F32,
-    Encoding::F64,
-    Encoding::U8,
-    Encoding::U8Norm,
-    Encoding::I8,
-    Encoding::I8Norm,
-    Encoding::U16,
-    Encoding::U16Norm,
-    Encoding::I16,
-    Encoding::I16Norm,
-    Encoding::U32,
-    Encoding::I32,
-];
-
 /// Bytes of a number, and its bytes.
 fn stored(encoding: Encoding, x: f64) -> (usize, [u8; 8]) {
     let mut out = [0; 8];
@@ -113,7 +97,7 @@ pub(super) fn write(extras: &Extras) -> Vec<u8> {
             if numbers.windows(2).all(|w| w[0] == w[1]) {
                 numbers.truncate(1);
             }
-            let encoding = ENCODINGS.iter().position(|&e| e == of.encoding).unwrap_or(0) as u8;
+            let encoding = Encoding::ALL.iter().position(|&e| e == of.encoding).unwrap_or(0) as u8;
             Column { name: of.name.clone(), encoding, values: put(&mut data, size, &numbers) }
         })
         .collect();
@@ -177,7 +161,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Extras, DecodeError> {
     }
     for c in head.faces {
         let encoding =
-            *ENCODINGS.get(c.encoding as usize).ok_or_else(|| bad("have numbers of an unknown kind"))?;
+            *Encoding::ALL.get(c.encoding as usize).ok_or_else(|| bad("have numbers of an unknown kind"))?;
         let have = numbers(c.values, stored(encoding, 0.0).0)?;
         let mut values: Vec<f64> = have.into_iter().map(|b| value(encoding, b)).collect();
         match values[..] {
