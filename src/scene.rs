@@ -19,6 +19,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Images that materials refer to.
     pub images: Vec<Image>,
+    /// What is said of the whole, by name: comments in PLY and OBJ, extras of the (first) scene in glTF, kept in a `.pm`; other formats hold none.
+    pub facts: serde_json::Map<String, serde_json::Value>,
     /// What a glTF file holds beside its meshes, carried through to a glTF output. Where it is there, texture coordinates are as glTF
     /// has them (v runs down); elsewhere v runs up. [`crate::io::encode`] turns them over as the output needs.
     pub gltf: Option<Box<crate::io::gltf::Source>>,
@@ -193,6 +195,12 @@ pub struct Image {
 }
 
 impl Scene {
+    /// What is said of it, a line each.
+    pub(crate) fn comments(&self) -> impl Iterator<Item = String> {
+        let line = |text: String| text.replace(|c: char| c.is_control(), " ");
+        self.facts.iter().map(move |(name, value)| line(format!("{name} {value}")))
+    }
+
     /// A scene of one mesh in one node.
     pub fn from_mesh(mesh: SceneMesh) -> Self {
         let node =

@@ -35,6 +35,21 @@ fn info_says_what_a_grid_holds() {
 }
 
 #[test]
+fn colours_that_code_heights_are_no_type_of_number() {
+    let p = Place::new();
+    let mut bytes = vec![];
+    let mut encoder = png::Encoder::new(&mut bytes, 2, 1);
+    encoder.set_color(png::ColorType::Rgb);
+    // 100,000 and 100,005 tenths above -10,000 m.
+    encoder.write_header().unwrap().write_image_data(&[1, 134, 160, 1, 134, 165]).unwrap();
+    p.write("a.png", bytes);
+    let info = p.done("terrain info a.png --json").json();
+    assert_eq!((&info["type"], &info["layout"]), (&"rgb8".into(), &"PNG, terrain-rgb".into()));
+    assert_eq!(info["range"], serde_json::json!([0.0, 0.5]));
+    assert!(p.done("terrain info a.png").stdout.contains("2 x 1 samples, rgb8"));
+}
+
+#[test]
 fn a_map_is_drawn_for_any_grid() {
     let p = Place::new();
     p.done("generate terrain a.tif --size 300 -q");

@@ -423,6 +423,62 @@ fn breaklines_go_through_tiles() {
 }
 
 #[test]
+fn breaklines_go_through_tiles_of_the_globe() {
+    let p = Place::new();
+    grid(&p, false);
+    // Along a meridian and along a parallel, through several tiles.
+    let (longitude, latitude, ends) = (8.3, 46.55, [0.2, 0.8]);
+    let lines = format!(
+        r#"{{"type": "MultiLineString", "coordinates": [[[{longitude}, {}], [{longitude}, {}]], [[{}, {latitude}], [{}, {latitude}]]]}}"#,
+        46.0 + ends[0],
+        46.0 + ends[1],
+        8.0 + ends[0],
+        8.0 + ends[1]
+    );
+    p.write("roads.json", lines);
+    let run = p.done(&format!(
+        "terrain tin {HGT} out --max-error 20 --tiles 4 --tile-format quantized-mesh --breaklines roads.json --verify --json"
+    ));
+    let report = run.json();
+    assert_eq!(
+        (&report["verified"]["good"], &report["tiles"]["border_mismatches"]),
+        (&true.into(), &0.into())
+    );
+    let b = &report["breaklines"];
+    assert_eq!((&b["lines"], &b["missing"], &b["outside"]), (&2.into(), &0.into(), &0.into()), "{b}");
+    // Sides of triangles along each, tile by tile, in degrees.
+    let layer: Value = serde_json::from_slice(&p.read("out/layer.json")).unwrap();
+    let levels = layer["available"].as_array().unwrap();
+    let (z, side) = (levels.len() - 1, 180.0 / 2f64.powi(levels.len() as i32 - 1));
+    let step = side / (side / STEP).ceil();
+    let mut along = [0.0f64; 2];
+    for r in levels[z].as_array().unwrap() {
+        let n = |key: &str| r[key].as_u64().unwrap();
+        for (x, y) in (n("startX")..=n("endX")).flat_map(|x| (n("startY")..=n("endY")).map(move |y| (x, y))) {
+            let tile = quantized(&p.read(&format!("out/{z}/{x}/{y}.terrain")));
+            let degrees = |v: usize| {
+                let [u, v, _] = tile.vertices[v].map(|c| f64::from(c) / 32_767.0 * side);
+                [u + x as f64 * side - 180.0, v + y as f64 * side - 90.0]
+            };
+            let sides = tile.triangles.iter().flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]);
+            // Each but those of borders comes twice, once from either side.
+            let sides: std::collections::BTreeSet<[usize; 2]> =
+                sides.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+            for [a, b] in sides {
+                let (a, b) = (degrees(a), degrees(b));
+                for (k, at) in [longitude, latitude].into_iter().enumerate() {
+                    let near = |p: [f64; 2]| (p[k] - at).abs() <= 0.5 * step + 1e-4;
+                    if near(a) && near(b) {
+                        along[k] += (a[1 - k] - b[1 - k]).abs();
+                    }
+                }
+            }
+        }
+    }
+    assert!(along.iter().all(|&l| l > 0.6 - 1.01 * step), "{along:?}");
+}
+
+#[test]
 fn tiles_keep_the_error_between_samples_too() {
     let p = Place::new();
     grid(&p, true);

@@ -107,6 +107,78 @@ fn a_glb_is_in_metres_with_y_up_and_the_normals_of_the_grid() {
     assert!(unknown.stderr.contains("--spacing"), "{}", unknown.stderr);
 }
 
+/// The error is proven for what is written: for readers of f64 too, which get another number from the few digits that an f32 needs.
+#[test]
+fn text_holds_the_heights_that_were_proven() {
+    let p = Place::new();
+    p.write(
+        "a.raw",
+        (0..30 * 30u32)
+            .flat_map(|i| (1e4 + f64::from(i * 7919 % 1009) * 0.3).to_le_bytes())
+            .collect::<Vec<u8>>(),
+    );
+    for (name, mark, from) in
+        [("a.obj", "v ", 1), ("a.ply", "", 0), ("a.stl", "vertex ", 1), ("a.off", "", 0)]
+    {
+        p.done(&format!("terrain tin a.raw {name} --max-error 9 --size 30x30 --type f64 --text -q"));
+        let text = p.text(name);
+        let mut points = 0;
+        for line in text.lines().map(str::trim).filter(|l| l.starts_with(mark)) {
+            let words: Vec<&str> = line.split_whitespace().skip(from).collect();
+            // Vertices, not faces or heads.
+            let [x, y, z] = words[..] else { continue };
+            let (Ok(_), Ok(_), Ok(z)) = (x.parse::<f64>(), y.parse::<f64>(), z.parse::<f64>()) else {
+                continue;
+            };
+            if z > 9e3 {
+                points += 1;
+                assert_eq!(z, f64::from(z as f32), "{name}: {line}");
+            }
+        }
+        assert!(points > 100, "{name}: {points}");
+    }
+}
+
+#[test]
+fn where_the_grid_lies_is_passed_on() {
+    let p = Place::new();
+    // A tile of a degree, its first sample at 11 E, 58 N.
+    p.write("N57E011.hgt", (0..25i16).flat_map(|i| (i * i % 7).to_be_bytes()).collect::<Vec<u8>>());
+    let transform = "[0.25,0.0,11.0,0.0,-0.25,58.0]";
+    for name in ["a.ply", "a.obj"] {
+        p.done(&format!("terrain tin N57E011.hgt {name} --max-error 1 --text -q"));
+        let text = p.text(name);
+        for fact in [&format!("terrain_transform {transform}"), "terrain_crs \"EPSG:4326\"", "terrain_error "]
+        {
+            assert!(text.lines().take(20).any(|l| l.contains(fact)), "{name}: {fact}");
+        }
+    }
+    p.done("terrain tin N57E011.hgt a.glb --max-error 1 -q");
+    p.done("terrain build N57E011.hgt a.pm -q");
+    // From a progressive terrain on to what is made of it.
+    p.done("decode a.pm b.glb -q");
+    p.write(
+        "cam.json",
+        r#"{"eye": [0, 9e5, 0], "target": [0, 0, 1], "up": [0, 0, -1], "fov_y_deg": 60, "width": 640, "height": 480, "near": 1, "far": 2e6}"#,
+    );
+    p.done("extract a.pm c.glb --camera cam.json -q");
+    for name in ["a.glb", "b.glb", "c.glb"] {
+        let bytes = p.read(name);
+        let document: Value = serde_json::from_slice(&gltf::Glb::from_slice(&bytes).unwrap().json).unwrap();
+        let extras = &document["scenes"][0]["extras"];
+        assert_eq!(extras["terrain_transform"].to_string(), transform, "{name}");
+        assert_eq!(extras["terrain_crs"], "EPSG:4326");
+        assert_eq!(extras["terrain_origin"], serde_json::json!([11.5, 57.5]));
+        assert!(extras["terrain_spacing"][1].as_f64() > Some(27_000.0));
+        // What is said of a file is true of all that is made of it.
+        let (name, other) = match name {
+            "a.glb" => ("terrain_error", "terrain_error_at_full_detail"),
+            _ => ("terrain_error_at_full_detail", "terrain_error"),
+        };
+        assert!(extras[name].as_f64().is_some_and(|e| e <= 1.0) && extras.get(other).is_none());
+    }
+}
+
 #[test]
 fn the_number_of_threads_does_not_show() {
     let p = place();
@@ -245,7 +317,6 @@ fn breaklines_are_followed_and_what_cannot_be_is_said() {
     fails("--breaklines none.json", 3, "none.json");
     fails("--breaklines roads.json --method regular", 2, "--method best or greedy");
     fails("--breaklines roads.json --breakline-space world", 2, "--breakline-space grid");
-    fails("--breaklines roads.json --tiles 2 --tile-format quantized-mesh", 2, "samples of their own");
     fails("--breakline-space grid", 2, "--breaklines");
 }
 

@@ -180,20 +180,20 @@ impl Output {
         interrupt: &Interrupt,
         warnings: &mut Warnings,
     ) -> Result<(), Failure> {
-        self.write_with_facts(format, scene, vec![], interrupt, warnings)
+        self.write_with(format, scene, |_| {}, interrupt, warnings)
     }
 
-    /// The same, with facts about the content where the format has a place for them.
-    pub(crate) fn write_with_facts(
+    /// The same with options changed.
+    pub(crate) fn write_with(
         &self,
         format: Format,
         scene: &Scene,
-        facts: Vec<(String, serde_json::Value)>,
+        change: impl FnOnce(&mut EncodeOptions),
         interrupt: &Interrupt,
         warnings: &mut Warnings,
     ) -> Result<(), Failure> {
         let mut options: EncodeOptions = files::encode_options(&self.output, self.text);
-        options.facts = facts;
+        change(&mut options);
         common::write(&self.output, format, &options, scene, interrupt, warnings)
     }
 }

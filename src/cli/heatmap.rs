@@ -106,10 +106,10 @@ impl Heat<'_> {
         warnings: &mut Warnings,
     ) -> Result<(), Failure> {
         let [a, b] = self.flattened;
-        let scene = heat_scene(a, &b.surface, scale, format == Format::Glb)
+        let mut scene = heat_scene(a, &b.surface, scale, format == Format::Glb)
             .map_err(|e| Failure::Output(format!("{}: {e}", path.display())))?;
-        let mut options = files::encode_options(path, false);
-        options.facts = vec![
+        let options = files::encode_options(path, false);
+        let facts: [(String, serde_json::Value); 8] = [
             ("heatmap".into(), json!("distance of A from B, by vertex, as colour and as attribute quality")),
             ("a".into(), json!(self.names[0])),
             ("b".into(), json!(self.names[1])),
@@ -119,6 +119,7 @@ impl Heat<'_> {
             ("unit".into(), json!("model units")),
             ("diagonal_of_a".into(), json!(self.found.distances.diagonal)),
         ];
+        scene.facts.extend(facts);
         common::write(path, format, &options, &scene, interrupt, warnings)
     }
 }

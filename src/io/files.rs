@@ -704,6 +704,13 @@ pub fn peak_bytes() -> Option<u64> {
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kb| 1024 * kb)
 }
 
+/// The memory that programs may still take without anything being swapped out, in bytes; `None` where the system does not tell (all but Linux).
+pub fn free_bytes() -> Option<u64> {
+    let about = fs::read_to_string("/proc/meminfo").ok()?;
+    let line = about.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kb| 1024 * kb)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

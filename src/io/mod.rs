@@ -86,10 +86,11 @@ pub struct EncodeOptions {
     pub text: bool,
     /// Stem of the output file, for the names of files beside it.
     pub stem: String,
+    /// Text gives positions with all their digits, not only as many as f32 needs: read as f64 they are what they were, where shorter ones are a
+    /// little beside it.
+    pub all_digits: bool,
     /// Images are not part of the output: glTF refers to them by their URIs, which must lead to them from the output.
     pub link_images: bool,
-    /// Facts about the content, by name: comments in the head of a PLY file, extras of the (first) scene in glTF; others hold none.
-    pub facts: Vec<(String, serde_json::Value)>,
 }
 
 /// Why a file could not be decoded. The file's name is added by whoever opened it.

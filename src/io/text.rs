@@ -474,6 +474,11 @@ pub(crate) fn write_f32(out: &mut Vec<u8>, x: f32) {
     }
 }
 
+/// A position, with [`super::EncodeOptions::all_digits`] as the number that it is.
+pub(crate) fn write_place(out: &mut Vec<u8>, x: f32, all_digits: bool) {
+    if all_digits { write_f64(out, f64::from(x)) } else { write_f32(out, x) }
+}
+
 /// Writes the shortest decimal that reads back as `x` bit for bit as f64. See [`f64_mark`] for a file of short decimals.
 /// NaN and infinities are written as `nan`, `inf`, `-inf`.
 pub(crate) fn write_f64(out: &mut Vec<u8>, x: f64) {

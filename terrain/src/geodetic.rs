@@ -22,6 +22,8 @@ pub struct Geodetic {
     left: usize,
     /// Steps from the south pole to the first row.
     top: usize,
+    /// From columns and rows of the grid given to those of the lattice.
+    from_samples: Affine,
 }
 
 /// Why there are no such tiles.
@@ -109,7 +111,15 @@ impl Geodetic {
             heights.extend(along.iter().map(|&(x, fx)| height_at(grid, [x, y], [fx, fy])));
         }
         let grid = Grid::of_finite(columns, rows, heights);
-        Ok(Geodetic { grid, level, steps, exact, left, top })
+        let from_samples = Affine([
+            dx / step,
+            0.0,
+            (west + 180.0) / step - left as f64,
+            0.0,
+            -dy / step,
+            top as f64 - (north + 90.0) / step,
+        ]);
+        Ok(Geodetic { grid, level, steps, exact, left, top, from_samples })
     }
 
     /// Degrees of a lattice step.
@@ -123,6 +133,12 @@ impl Geodetic {
     pub fn transform(&self) -> Affine {
         let step = self.step();
         Affine::north_up([self.left as f64 * step - 180.0, self.top as f64 * step - 90.0], [step, step])
+    }
+
+    /// Where a column and a row of the grid that it was made of lie on the lattice, in columns and rows.
+    #[must_use]
+    pub fn on_lattice(&self, point: [f64; 2]) -> [f64; 2] {
+        self.from_samples.apply(point)
     }
 
     /// Steps along a tile of a level, at most the finest.

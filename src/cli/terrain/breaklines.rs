@@ -5,6 +5,7 @@ use crate::cli::common::{Warnings, thousands};
 use clap::ValueEnum;
 use progmesh::io::grid::GridFile;
 use progmesh::io::{files, geojson};
+use progmesh::terrain::Geodetic;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -45,10 +46,11 @@ impl BreaklineArgs {
         self.breaklines.is_some()
     }
 
-    /// Straight steps between samples, and what is known of them so far.
+    /// Straight steps between samples, and what is known of them so far; with `lattice` between its points.
     pub(super) fn steps(
         &self,
         source: &GridFile,
+        lattice: Option<&Geodetic>,
         warnings: &mut Warnings,
     ) -> Result<(Vec<Step>, Option<Breaklines>), Failure> {
         let Some(path) = &self.breaklines else { return Ok((vec![], None)) };
@@ -72,11 +74,18 @@ impl BreaklineArgs {
                 ));
             }
         };
-        let most = [source.raster.columns(), source.raster.rows()].map(|n| n.saturating_sub(1) as f64);
+        let size = match lattice {
+            Some(lattice) => [lattice.grid.columns(), lattice.grid.rows()],
+            None => [source.raster.columns(), source.raster.rows()],
+        };
+        let most = size.map(|n| n.saturating_sub(1) as f64);
         let mut facts = Breaklines { lines: read.lines.len(), ..Breaklines::default() };
         let mut steps = vec![];
         for line in &read.lines {
-            let place = |&p: &[f64; 2]| transform.map_or(Some(p), |t| t.invert(p));
+            let place = |&p: &[f64; 2]| {
+                let of_grid = transform.map_or(Some(p), |t| t.invert(p))?;
+                Some(lattice.map_or(of_grid, |l| l.on_lattice(of_grid)))
+            };
             let points: Option<Vec<[f64; 2]>> = line.iter().map(place).collect();
             let points = points.ok_or_else(|| failed("the grid's transform has no inverse".into()))?;
             for pair in points.windows(2) {

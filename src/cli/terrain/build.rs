@@ -1,5 +1,6 @@
 //! `progmesh terrain build GRID OUT.pm`.
 
+use super::facts::facts;
 use super::input::{GridInput, known_spacing};
 use crate::cli::Failure;
 use crate::cli::args;
@@ -7,6 +8,7 @@ use crate::cli::common::{self, Warnings, short, thousands};
 use crate::cli::control::{Interrupt, Progress};
 use crate::cli::ending::PmEnding;
 use progmesh::blocks::{self, BuildError, Figures, Options};
+use progmesh::ground::Space;
 use progmesh::io::files::{self, WorkFolder};
 use progmesh::io::grid::GridFile;
 use progmesh::io::pm::{Terrain, write_terrain};
@@ -113,9 +115,11 @@ impl Args {
             let writing = Instant::now();
             let figures = *blocks.figures();
             let terrain = terrain(&source, &figures, self.block);
+            let space = Space::World { spacing: figures.spacing, exaggeration: 1.0 };
+            let facts = facts(&source, space, ("terrain_error_at_full_detail", figures.error));
             let mut bytes = 0;
             files::write_with(self.ending.path(), |to| {
-                bytes = write_terrain(&coded, &terrain, to)?;
+                bytes = write_terrain(&coded, &terrain, facts, to)?;
                 Ok::<_, OnWriting>(())
             })
             .map_err(|e| failed(&e.0))?;

@@ -3,9 +3,11 @@
 use super::input::{GridInput, unread};
 use crate::cli::Failure;
 use crate::cli::common::{self, Warnings, short, thousands};
+use crate::cli::control::{Interrupt, Progress};
 use crate::cli::picture::png_name;
-use progmesh::io::grid::GridFile;
+use progmesh::io::grid::{Encoding, GridFile};
 use progmesh::report::relief;
+use progmesh::simplify::Control;
 use progmesh::terrain::{Crs, CrsKind, Overview, SampleAt, Summary};
 use serde::Serialize;
 use std::fmt::Write;
@@ -47,12 +49,19 @@ impl Args {
         }
         let (columns, rows) = (grid.raster.columns(), grid.raster.rows());
         let mut overview = self.png.as_ref().map(|_| Overview::new(columns, rows, MAP));
+        let interrupt = Interrupt::watch();
+        let progress = Progress::new(&interrupt, self.quiet, "reading");
         let summary = Summary::of(&*grid.raster, |window, heights| {
+            // Windows come row by row, and in each from left to right.
+            let seen =
+                window.row as f64 + (window.rows * (window.column + window.columns)) as f64 / columns as f64;
+            progress.progress(seen / rows as f64);
             if let Some(o) = &mut overview {
                 o.add(window, heights);
             }
             Ok(())
         });
+        drop(progress);
         let summary = summary.map_err(unread)?;
         if let (Some(path), Some(overview)) = (&self.png, overview) {
             write_map(path, overview, &grid)?;
@@ -140,7 +149,10 @@ impl Info {
             layout: grid.layout.clone(),
             columns,
             rows,
-            sample: grid.sample.name(),
+            sample: match grid.encoding {
+                Encoding::Plain => grid.sample.name(),
+                Encoding::TerrainRgb | Encoding::Terrarium => "rgb8",
+            },
             nodata: grid.nodata,
             void: summary.void,
             valid: summary.valid,

@@ -1,7 +1,7 @@
 //! `GRID` and the flags that say how to read it.
 
 use crate::cli::Failure;
-use crate::cli::common::{self, Warnings, thousands};
+use crate::cli::common::{self, Warnings, short, thousands};
 use clap::ValueEnum;
 use progmesh::io::files::{self, OpenGridError};
 use progmesh::io::grid::{
@@ -168,8 +168,27 @@ pub(crate) fn unread(e: RasterError) -> Failure {
     Failure::Input(e.to_string())
 }
 
-/// All heights of a grid at once.
+/// Bytes that a sample takes at least while networks are made of a grid.
+const SAMPLE_BYTES: u64 = 20;
+
+/// Fails if a grid does not fit into memory with what is made of it.
+fn check_memory(name: &str, [columns, rows]: [usize; 2], free: Option<u64>) -> Result<(), Failure> {
+    let needed = (columns as u64).saturating_mul(rows as u64).saturating_mul(SAMPLE_BYTES);
+    let Some(free) = free.filter(|&free| free < needed) else { return Ok(()) };
+    let gigabytes = |bytes: u64| short(bytes as f64 / 1e9);
+    Err(Failure::Input(format!(
+        "{name}: one network of {} x {} samples takes {} GB of memory or more, and {} are free. `progmesh terrain build --floor E` reads a grid of any size window by window, and `progmesh decode` makes the \
+         triangles of what it writes",
+        thousands(columns),
+        thousands(rows),
+        gigabytes(needed),
+        gigabytes(free)
+    )))
+}
+
+/// All heights of a grid at once, to make networks of.
 pub(crate) fn whole(name: &str, grid: &GridFile) -> Result<Grid, Failure> {
+    check_memory(name, [grid.raster.columns(), grid.raster.rows()], files::free_bytes())?;
     grid.raster.whole(MOST_SAMPLES).map_err(|e| match e {
         RasterError::TooMany { columns, rows, limit } => Failure::Input(format!(
             "{name}: {} x {} samples are more than the {} that are held at once",
@@ -184,6 +203,18 @@ pub(crate) fn whole(name: &str, grid: &GridFile) -> Result<Grid, Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_grid_that_memory_cannot_hold_is_refused_with_what_to_do() {
+        let check = |size, free| {
+            check_memory("a.tif", size, free).map_err(|e| e.message().unwrap_or_default().to_string())
+        };
+        assert_eq!(check([1000, 1000], Some(20_000_000)), Ok(()));
+        assert_eq!(check([usize::MAX, 9], None), Ok(()), "where nobody knows");
+        let said = check([20_000, 20_000], Some(2_000_000_000)).unwrap_err();
+        assert!(said.starts_with("a.tif: one network of 20,000 x 20,000 samples takes 8 GB"), "{said}");
+        assert!(said.contains("and 2 are free") && said.contains("terrain build --floor E"), "{said}");
+    }
 
     #[test]
     fn sizes_and_types_are_read_as_written() {

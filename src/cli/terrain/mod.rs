@@ -3,6 +3,7 @@
 mod breaklines;
 mod build;
 mod dress;
+mod facts;
 mod info;
 pub(crate) mod input;
 mod tile_report;

@@ -51,11 +51,13 @@ pub(super) struct Job<'a> {
     pub source: &'a GridFile,
     pub space: Space,
     pub dress: &'a Dress,
-    pub facts: Vec<(String, Value)>,
+    pub facts: Map<String, Value>,
     pub options: Options,
     /// At the finest level; it doubles from level to level.
     pub error: f64,
     pub format: TileFormat,
+    /// Of quantized-mesh: what tiles are made of in place of the grid.
+    pub geodetic: Option<&'a Geodetic>,
     pub verify: bool,
 }
 
@@ -113,6 +115,31 @@ pub(super) fn is_geographic(source: &GridFile) -> bool {
     source.georeference.crs.as_ref().is_some_and(|c| c.kind == CrsKind::Geographic)
 }
 
+/// A grid of degrees on the lattice of the globe's tiles.
+pub(super) fn geodetic(
+    file: &str,
+    source: &GridFile,
+    grid: &Grid,
+    across: usize,
+    warnings: &mut Warnings,
+) -> Result<Geodetic, Failure> {
+    let unfit = |why: String| {
+        let advice =
+            "quantized-mesh tiles lie on the globe (EPSG:4326); --tile-format 3d-tiles and glb take any grid";
+        Failure::Input(format!("{file}: {why}; {advice}"))
+    };
+    let transform = source.georeference.transform.filter(|_| is_geographic(source));
+    let transform = transform.ok_or_else(|| unfit("the grid is not in degrees".into()))?;
+    let made = Geodetic::new(grid, transform, across).map_err(|e| unfit(e.to_string()))?;
+    if !made.exact {
+        let [columns, rows] = [made.grid.columns(), made.grid.rows()];
+        warnings.say([format!(
+            "{file}: tiles of the globe have borders between samples: {columns} x {rows} heights were interpolated, and the error holds at these"
+        )]);
+    }
+    Ok(made)
+}
+
 impl Job<'_> {
     /// Makes all tiles of all levels and writes them to `target`, a directory that appears whole. `across` tiles along a side at the finest level.
     pub(super) fn run(
@@ -123,11 +150,8 @@ impl Job<'_> {
         (interrupt, quiet): (&Interrupt, bool),
         warnings: &mut Warnings,
     ) -> Result<Outcome, Failure> {
-        let geodetic = match self.format {
-            TileFormat::QuantizedMesh => Some(self.geodetic(grid, across, warnings)?),
-            _ => None,
-        };
-        let (grid, space) = match &geodetic {
+        let geodetic = self.geodetic;
+        let (grid, space) = match geodetic {
             None => (grid, self.space),
             Some(g) => {
                 let exaggeration = match self.space {
@@ -138,7 +162,7 @@ impl Job<'_> {
             }
         };
         let range = grid.range().map_or(0.0, |(least, greatest)| greatest - least);
-        let plans = plans(grid, geodetic.as_ref(), across, self.error, range);
+        let plans = plans(grid, geodetic, across, self.error, range);
         let coarsest = plans.iter().map(|p| p.error).fold(0.0, f64::max);
         let tiling = Tiling::new(grid, &self.options, coarsest).map_err(|e| failure(self.file, &e))?;
         let unwritten = |e: io::Error| Failure::Output(format!("{}: {e}", target.display()));
@@ -150,7 +174,7 @@ impl Job<'_> {
             grid,
             space,
             tiling: &tiling,
-            geodetic: geodetic.as_ref(),
+            geodetic,
             staged: &staged,
             watch: Watch(&progress),
             finished: AtomicUsize::new(0),
@@ -173,7 +197,7 @@ impl Job<'_> {
                 }
             }
             let between = self.options.contract == Contract::Surface;
-            let step = geodetic.as_ref().map(|_| quantized_mesh::height_step(work.heights(plan.error)));
+            let step = geodetic.map(|_| quantized_mesh::height_step(work.heights(plan.error)));
             levels.push(level_report(plan, &done, (self.verify.then_some(&borders), between), step));
             lines.bent = bent + done.iter().map(|d| d.bent).sum::<usize>();
             lines.outside = done.iter().map(|d| d.outside).sum();
@@ -191,7 +215,7 @@ impl Job<'_> {
                 border_mismatches: self
                     .verify
                     .then(|| levels.iter().filter_map(|l| l.border_mismatches).sum()),
-                resampled: geodetic.as_ref().is_some_and(|g| !g.exact),
+                resampled: geodetic.is_some_and(|g| !g.exact),
                 levels,
             },
             errors: overall(finest),
@@ -201,7 +225,7 @@ impl Job<'_> {
             grid_triangles: tiling.grid_triangles(),
             verdict,
         };
-        let index = self.index(&plans, &all, geodetic.as_ref(), grid, space);
+        let index = self.index(&plans, &all, geodetic, grid, space);
         let (name, value) = index;
         let text = serde_json::to_vec_pretty(&value).map_err(|e| Failure::Output(e.to_string()))?;
         staged.write(name, &text).map_err(unwritten)?;
@@ -217,25 +241,6 @@ impl Job<'_> {
         Ok(outcome)
     }
 
-    fn geodetic(&self, grid: &Grid, across: usize, warnings: &mut Warnings) -> Result<Geodetic, Failure> {
-        let unfit = |why: String| {
-            let advice = "quantized-mesh tiles lie on the globe (EPSG:4326); --tile-format 3d-tiles and glb take any grid";
-            Failure::Input(format!("{}: {why}; {advice}", self.file))
-        };
-        let place = &self.source.georeference;
-        let transform = place.transform.filter(|_| is_geographic(self.source));
-        let transform = transform.ok_or_else(|| unfit("the grid is not in degrees".into()))?;
-        let made = Geodetic::new(grid, transform, across).map_err(|e| unfit(e.to_string()))?;
-        if !made.exact {
-            let [columns, rows] = [made.grid.columns(), made.grid.rows()];
-            warnings.say([format!(
-                "{}: tiles of the globe have borders between samples: {columns} x {rows} heights were interpolated, and the error holds at these",
-                self.file
-            )]);
-        }
-        Ok(made)
-    }
-
     /// The file that lists the tiles.
     fn index(
         &self,
@@ -245,7 +250,7 @@ impl Job<'_> {
         grid: &Grid,
         space: Space,
     ) -> (&'static str, Value) {
-        let facts: Map<String, Value> = self.facts.iter().cloned().collect();
+        let facts = self.facts.clone();
         match self.format {
             TileFormat::Tileset => {
                 let mut tiles = tileset::Tiles::new();

@@ -2,6 +2,7 @@
 
 use super::breaklines::{BreaklineArgs, Breaklines};
 use super::dress::DressArgs;
+use super::facts::facts;
 use super::input::{GridInput, known_spacing, whole};
 use super::tiles::{self, Job, TileFormat};
 use super::tin_report::{ErrorReport, OutlineReport, Report, Seconds, Verified};
@@ -17,7 +18,6 @@ use progmesh::io::grid::GridFile;
 use progmesh::simplify::Control;
 use progmesh::terrain::tin::{self, Contract, Made, Method, Options, TinError, Verdict};
 use progmesh::terrain::{Grid, fill_voids};
-use serde_json::json;
 use std::time::Instant;
 
 /// Make few triangles of a height grid, none of its samples farther from them than an error.
@@ -245,7 +245,7 @@ impl Args {
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
             let making = Instant::now();
-            let (lines, mut breaklines) = self.breaklines.steps(&source, warnings)?;
+            let (lines, mut breaklines) = self.breaklines.steps(&source, None, warnings)?;
             let options = self.options().with_breaklines(lines);
             let progress = Progress::new(interrupt, self.quiet, "triangulating");
             let made =
@@ -273,9 +273,10 @@ impl Args {
                 return Err(Failure::Interrupted);
             }
             let writing = Instant::now();
-            let scene = ground::scene(&made.tin, &grid, space, &dress, "terrain");
-            let facts = facts(&source, &grid, space, made.errors.max);
-            self.output.write_with_facts(format, &scene, facts, interrupt, warnings)?;
+            let mut scene = ground::scene(&made.tin, &grid, space, &dress, "terrain");
+            scene.facts = facts(&source, space, ("terrain_error", made.errors.max));
+            // What was proven is what any reader gets.
+            self.output.write_with(format, &scene, |o| o.all_digits = true, interrupt, warnings)?;
             let write = writing.elapsed().as_secs_f64();
             if let Some(d) = &mut drawing {
                 let (space, dress) =
@@ -310,12 +311,6 @@ impl Args {
         if !matches!(self.method, MethodName::Best | MethodName::Greedy) {
             return Err(Failure::Usage("--tiles goes with --method best or greedy".into()));
         }
-        if self.breaklines.are_given() && self.tile_format == TileFormat::QuantizedMesh {
-            return Err(Failure::Usage(
-                "--breaklines lead from sample to sample, and quantized-mesh tiles have samples of their own: --tile-format 3d-tiles and glb follow them"
-                    .into(),
-            ));
-        }
         if self.tile_format == TileFormat::QuantizedMesh && (self.spacing.is_some() || self.dress.drapes()) {
             return Err(Failure::Usage(
                 "quantized-mesh tiles lie on the globe, and clients lay pictures over them: leave out --spacing, --uv and --texture"
@@ -346,16 +341,21 @@ impl Args {
             interrupt.be_graceful();
             let making = Instant::now();
             let error = self.max_error.unwrap_or_default();
-            let (lines, mut breaklines) = self.breaklines.steps(&source, warnings)?;
+            let geodetic = match self.tile_format {
+                TileFormat::QuantizedMesh => Some(tiles::geodetic(&file, &source, &grid, across, warnings)?),
+                _ => None,
+            };
+            let (lines, mut breaklines) = self.breaklines.steps(&source, geodetic.as_ref(), warnings)?;
             let job = Job {
                 file: &file,
                 source: &source,
                 space,
                 dress: &dress,
-                facts: facts(&source, &grid, space, error),
+                facts: facts(&source, space, ("terrain_error", error)),
                 options: self.options().with_breaklines(lines),
                 error,
                 format: self.tile_format,
+                geodetic: geodetic.as_ref(),
                 verify: self.verify,
             };
             let outcome = job.run(&grid, across, &target, (interrupt, self.quiet), warnings)?;
@@ -523,28 +523,6 @@ fn isolated_samples(count: usize) -> Option<String> {
             thousands(count)
         )
     })
-}
-
-/// What a file says about where it lies.
-fn facts(source: &GridFile, grid: &Grid, space: Space, error: f64) -> Vec<(String, serde_json::Value)> {
-    let mut facts = vec![("terrain_error".to_string(), json!(error))];
-    let place = &source.georeference;
-    if let Space::World { spacing, exaggeration } = space {
-        facts.push(("terrain_spacing".into(), json!(spacing)));
-        facts.push(("terrain_exaggeration".into(), json!(exaggeration)));
-        // The model coordinates, in the grid's own system, of the scene's origin.
-        if let Some(origin) = place.transform.map(|t| t.apply(ground::middle(grid))) {
-            facts.push(("terrain_origin".into(), json!(origin)));
-        }
-    }
-    if let Some(crs) = &place.crs {
-        if let Some(epsg) = crs.epsg {
-            facts.push(("terrain_crs".into(), json!(format!("EPSG:{epsg}"))));
-        } else if let Some(name) = &crs.name {
-            facts.push(("terrain_crs".into(), json!(name)));
-        }
-    }
-    facts
 }
 
 pub(super) fn failure(file: &str, e: &TinError) -> Failure {

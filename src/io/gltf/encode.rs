@@ -24,21 +24,28 @@ use serde_json::{Map, Value, json};
 pub fn encode(scene: &Scene, format: Format, options: &EncodeOptions) -> Result<Encoded, EncodeError> {
     let mut writer = Writer::new(format);
     writer.link_images = options.link_images;
-    let (mut document, _) = begin(scene, &mut writer)?;
-    if let Some(Value::Object(first)) =
-        document.pointer_mut("/scenes/0").filter(|_| !options.facts.is_empty())
+    let (document, _) = begin(scene, &mut writer)?;
+    writer.finish(document, options)
+}
+
+/// What is said of a scene, as extras of the first.
+fn add_facts(document: &mut Value, scene: &Scene) {
+    if let Some(Value::Object(first)) = document.pointer_mut("/scenes/0").filter(|_| !scene.facts.is_empty())
     {
         let extras = first.entry("extras").or_insert_with(|| json!({}));
         if let Value::Object(extras) = extras {
-            extras.extend(options.facts.iter().cloned());
+            extras.extend(scene.facts.clone());
         }
     }
-    writer.finish(document, options)
 }
 
 /// The document of a scene, and where its meshes are in it; what else belongs to the file is in `writer`.
 pub(super) fn begin(scene: &Scene, writer: &mut Writer) -> Result<(Value, Vec<Option<Placed>>), EncodeError> {
-    let Some(source) = &scene.gltf else { return document::build(scene, writer) };
+    let Some(source) = &scene.gltf else {
+        let (mut document, placed) = document::build(scene, writer)?;
+        add_facts(&mut document, scene);
+        return Ok((document, placed));
+    };
     let mut document = patch(scene, source, writer)?;
     let mut placed = Vec::new();
     if let Value::Object(document) = &mut document {
@@ -47,6 +54,7 @@ pub(super) fn begin(scene: &Scene, writer: &mut Writer) -> Result<(Value, Vec<Op
         let place = |index| (index < there).then_some(Placed { index, offset: DVec3::ZERO });
         placed = (0..scene.meshes.len()).map(place).collect();
     }
+    add_facts(&mut document, scene);
     Ok((document, placed))
 }
 

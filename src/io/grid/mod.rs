@@ -78,7 +78,7 @@ impl GridFormat {
 /// How colours or grey stand for heights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// Grey is the height.
+    /// The number is the height.
     Plain,
     /// Mapbox: -10000 + (65536 R + 256 G + B) / 10.
     TerrainRgb,
@@ -143,7 +143,7 @@ pub fn mosaic(files: Vec<(String, GridFile)>) -> Result<GridFile, MosaicError> {
         return Ok(file);
     }
     let first = &files.first().ok_or(MosaicError::Empty)?.1;
-    let (format, sample, nodata) = (first.format, first.sample, first.nodata);
+    let (format, sample, encoding, nodata) = (first.format, first.sample, first.encoding, first.nodata);
     let layout = format!("{} files; the first: {}", files.len(), first.layout);
     let mut warnings = vec![];
     let parts = files.into_iter().map(|(name, file)| {
@@ -151,7 +151,16 @@ pub fn mosaic(files: Vec<(String, GridFile)>) -> Result<GridFile, MosaicError> {
         Part { name, raster: file.raster, georeference: file.georeference }
     });
     let (mosaic, georeference) = Mosaic::new(parts.collect())?;
-    Ok(GridFile { raster: Box::new(mosaic), georeference, format, sample, layout, nodata, warnings })
+    Ok(GridFile {
+        raster: Box::new(mosaic),
+        georeference,
+        format,
+        sample,
+        encoding,
+        layout,
+        nodata,
+        warnings,
+    })
 }
 
 /// What a decoder found, beside heights.
@@ -170,8 +179,10 @@ pub struct GridFile {
     pub georeference: Georeference,
     /// What it was read as.
     pub format: GridFormat,
-    /// What a sample is in the file.
+    /// What a sample is in the file; of colours, each channel.
     pub sample: SampleType,
+    /// How samples stand for heights.
+    pub encoding: Encoding,
     /// How it is laid out, for people.
     pub layout: String,
     /// The value that means no data.
@@ -217,7 +228,7 @@ pub fn open(source: Arc<dyn ReadAt>, name: &str, options: &GridOptions) -> Resul
     let head = source::bytes_at(&*source, 0, source.length().min(16)).unwrap_or_default();
     let told = || GridFormat::from_bytes(&head).or_else(|| GridFormat::from_name(name));
     let format = options.format.or_else(told).ok_or(GridError::UnknownFormat)?;
-    let mut georeference = Georeference::default();
+    let (mut georeference, mut encoding) = (Georeference::default(), Encoding::Plain);
     let (raw, facts): (Box<dyn Raster>, Facts) = match format {
         GridFormat::Tiff => {
             let (tiff, place, facts) = tiff::open(source, &options.cache)?;
@@ -231,6 +242,7 @@ pub fn open(source: Arc<dyn ReadAt>, name: &str, options: &GridOptions) -> Resul
         }
         GridFormat::Png => {
             let (picture, facts) = png::open(source, options.encoding, &options.cache)?;
+            encoding = picture.encoding;
             (Box::new(picture), facts)
         }
         GridFormat::Hgt => {
@@ -265,6 +277,7 @@ pub fn open(source: Arc<dyn ReadAt>, name: &str, options: &GridOptions) -> Resul
         georeference,
         format,
         sample: facts.sample,
+        encoding,
         layout: facts.layout,
         nodata,
         warnings: facts.warnings,

@@ -21,7 +21,7 @@ pub(super) struct Picture {
     bands: Bands,
     color: ColorType,
     wide: bool,
-    encoding: Encoding,
+    pub(super) encoding: Encoding,
     interlaced: bool,
     /// Where unpacking has got to, for whoever goes on from there.
     open: Mutex<Option<Unpacking>>,

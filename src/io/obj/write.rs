@@ -3,7 +3,7 @@
 use super::mtl;
 use crate::aif::{MeshInput, NONE, Positions, Semantic, Wedges};
 use crate::io::flatten::flatten;
-use crate::io::text::{f64_mark, write_f32, write_f64, write_f64_long};
+use crate::io::text::{f64_mark, write_f32, write_f64, write_f64_long, write_place};
 use crate::io::{EncodeError, EncodeOptions, Encoded};
 use crate::scene::{Group, Scene};
 use rustc_hash::FxHashMap;
@@ -24,6 +24,9 @@ pub fn encode(scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeE
         let names: Vec<&str> = lost.into_iter().collect();
         encoded.warnings.push(format!("OBJ cannot hold these properties of materials: {}", names.join(", ")));
     }
+    for comment in scene.comments() {
+        let _ = writeln!(writer.out, "# {comment}");
+    }
     if !scene.materials.is_empty() {
         let library = format!("{}.mtl", line_name(stem));
         let _ = writeln!(writer.out, "mtllib {library}");
@@ -36,7 +39,7 @@ pub fn encode(scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeE
             }
         }
     }
-    writer.vertices();
+    writer.vertices(options.all_digits);
     writer.faces(&flat.groups, flat.name, &names);
     encoded.bytes = writer.out;
     Ok(encoded)
@@ -155,7 +158,7 @@ impl<'a> Writer<'a> {
         self.colors = colors;
     }
 
-    fn vertices(&mut self) {
+    fn vertices(&mut self, all_digits: bool) {
         let mark = match &self.input.positions {
             Positions::F64(p) => f64_mark(p.as_flattened().iter().copied()),
             Positions::F32(_) => None,
@@ -165,7 +168,7 @@ impl<'a> Writer<'a> {
             for k in 0..3 {
                 self.out.push(b' ');
                 match &self.input.positions {
-                    Positions::F32(p) => write_f32(&mut self.out, p[i][k]),
+                    Positions::F32(p) => write_place(&mut self.out, p[i][k], all_digits),
                     Positions::F64(p) if mark == Some(3 * i + k) => write_f64_long(&mut self.out, p[i][k]),
                     Positions::F64(p) => write_f64(&mut self.out, p[i][k]),
                 }

@@ -2,7 +2,7 @@
 
 use crate::aif::{Encoding, MeshInput, NONE, Positions, Semantic};
 use crate::io::flatten::{Flat, flatten, has_named_groups};
-use crate::io::text::{f64_mark, write_f32, write_f64, write_f64_long};
+use crate::io::text::{f64_mark, write_f32, write_f64, write_f64_long, write_place};
 use crate::io::{EncodeError, EncodeOptions, Encoded, Format};
 use crate::scene::Scene;
 use std::io::Write;
@@ -11,7 +11,7 @@ use std::io::Write;
 /// vertex cannot be held and is left out, but for a colour that is one for each face, which becomes the face's.
 ///
 /// Errors: a face that names a missing vertex, a coordinate that is not finite.
-pub fn encode(scene: &Scene, _: &EncodeOptions) -> Result<Encoded, EncodeError> {
+pub fn encode(scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeError> {
     let flat = flatten(scene, "OFF");
     let mut warnings = flat.warnings.clone();
     let g = &*flat.geometry;
@@ -55,7 +55,7 @@ pub fn encode(scene: &Scene, _: &EncodeOptions) -> Result<Encoded, EncodeError> 
         for k in 0..3 {
             out.extend_from_slice(if k > 0 { b" " } else { b"" });
             match &g.positions {
-                Positions::F32(p) => write_f32(&mut out, p[v][k]),
+                Positions::F32(p) => write_place(&mut out, p[v][k], options.all_digits),
                 Positions::F64(p) if mark == Some(3 * v + k) => write_f64_long(&mut out, p[v][k]),
                 Positions::F64(p) => write_f64(&mut out, p[v][k]),
             }

@@ -30,10 +30,8 @@ pub fn encode(scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeE
     }
     let plan = Plan::new(input, &flat.extras, &textures, warnings);
     let out = if options.text { Sink::Text(Vec::new()) } else { Sink::Binary(Vec::new()) };
-    // A comment ends with its line.
-    let line = |text: String| text.replace(|c: char| c.is_control(), " ");
-    let comments = options.facts.iter().map(|(name, value)| line(format!("{name} {value}"))).collect();
-    encoded.bytes = write(input, &textures, &plan, comments, out);
+    let comments = scene.comments().collect();
+    encoded.bytes = write(input, &textures, &plan, comments, options.all_digits, out);
     Ok(encoded)
 }
 
@@ -438,6 +436,7 @@ fn write(
     textures: &Textures,
     plan: &Plan<'_>,
     comments: Vec<String>,
+    all_digits: bool,
     mut sink: Sink,
 ) -> Vec<u8> {
     let longest = faces(input).map(|f| f.len()).max().unwrap_or(0);
@@ -484,7 +483,7 @@ fn write(
     let (Sink::Text(out) | Sink::Binary(out)) = &mut sink;
     out.extend_from_slice(header.as_bytes());
 
-    write_vertices(input, plan, &mut sink);
+    write_vertices(input, plan, all_digits, &mut sink);
     for (f, face) in faces(input).enumerate() {
         sink.put(count(longest), face.len() as f64);
         face.clone().for_each(|c| sink.put(index, input.corners[c] as f64));
@@ -517,7 +516,9 @@ fn write(
     out
 }
 
-fn write_vertices(input: &MeshInput, plan: &Plan<'_>, sink: &mut Sink) {
+fn write_vertices(input: &MeshInput, plan: &Plan<'_>, all_digits: bool, sink: &mut Sink) {
+    // Text of more digits is still text.
+    let stored = if all_digits && matches!(sink, Sink::Text(_)) { Type::F64 } else { Type::F32 };
     let mark = match (&input.positions, &sink) {
         (Positions::F64(p), Sink::Text(_)) => f64_mark(p.as_flattened().iter().copied()),
         _ => None,
@@ -525,7 +526,7 @@ fn write_vertices(input: &MeshInput, plan: &Plan<'_>, sink: &mut Sink) {
     let lists = VertexCorners::default();
     for i in 0..input.positions.len() {
         match &input.positions {
-            Positions::F32(p) => p[i].iter().for_each(|&x| sink.put(Type::F32, x as f64)),
+            Positions::F32(p) => p[i].iter().for_each(|&x| sink.put(stored, x as f64)),
             Positions::F64(p) => {
                 for (k, &x) in p[i].iter().enumerate() {
                     if mark == Some(3 * i + k) { sink.put_marked(x) } else { sink.put(Type::F64, x) }

@@ -23,6 +23,8 @@ struct Shell<'a> {
     images: Vec<ImageShell<'a>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     gltf: Option<GltfShell>,
+    #[serde(default, skip_serializing_if = "serde_json::Map::is_empty")]
+    facts: serde_json::Map<String, serde_json::Value>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -216,6 +218,7 @@ pub fn write_shell(scene: &Scene, leftovers: &[Leftover], boxes: &[Option<Extent
             binary: keep(source.binary()),
             surfaces: source.surface_table(),
         }),
+        facts: scene.facts.clone(),
     };
     let json = serde_json::to_vec(&shell).unwrap_or_default();
     let mut out = (json.len() as u32).to_le_bytes().to_vec();
@@ -256,7 +259,7 @@ pub fn read_shell(bytes: &[u8]) -> Result<Shelled, DecodeError> {
         Ok(&data[at as usize..end as usize])
     };
     let owned = |s: Option<Cow<'_, str>>| s.map(Cow::into_owned);
-    let mut scene = Scene { roots: shell.roots, ..Default::default() };
+    let mut scene = Scene { roots: shell.roots, facts: shell.facts, ..Default::default() };
     let (mut leftovers, mut boxes) = (Vec::new(), Vec::new());
     for (i, m) in shell.meshes.into_iter().enumerate() {
         let extent = m.extent.map(|s| -> Result<Extent, DecodeError> {

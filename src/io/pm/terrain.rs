@@ -8,6 +8,7 @@ use crate::refine::format::{ChunkType, Piece, RangeReader};
 use crate::scene::{Scene, SceneMesh};
 use crate::selective::Ranges;
 use glam::{DMat4, DVec3};
+use serde_json::{Map, Value};
 use std::io::Write;
 use std::sync::Arc;
 
@@ -77,13 +78,19 @@ pub fn read_terrain(source: Arc<dyn ReadAt>) -> Option<Terrain> {
 }
 
 /// Writes a progressive terrain, in chunks that are read alone, level by level; returns how many bytes it has. In the scene it stands as [`crate::ground::Space::World`] says: the middle of the grid at
-/// the origin.
+/// the origin. `facts` are those of the scene.
 ///
 /// # Errors
 /// Those of the store and of `out`.
-pub fn write_terrain(coded: &Coded<'_>, terrain: &Terrain, out: &mut dyn Write) -> Result<u64, BuildError> {
+pub fn write_terrain(
+    coded: &Coded<'_>,
+    terrain: &Terrain,
+    facts: Map<String, Value>,
+    out: &mut dyn Write,
+) -> Result<u64, BuildError> {
     let mesh = SceneMesh { name: Some("terrain".into()), ..SceneMesh::default() };
     let mut scene = Scene::from_mesh(mesh);
+    scene.facts = facts;
     let [x, z] = terrain.spacing;
     let middle = [terrain.columns, terrain.rows].map(|n| f64::from(n.saturating_sub(1)) / 2.0);
     let origin = DVec3::new(-middle[0] * x, 0.0, -middle[1] * z);

@@ -4,7 +4,7 @@ use super::{FACET, HEADER};
 use crate::aif::triangulate_polygon;
 use crate::aif::{MeshInput, NONE, Positions, Semantic};
 use crate::io::flatten::{Flat, flatten, has_named_groups};
-use crate::io::text::{f64_mark, write_f32, write_f64, write_f64_long};
+use crate::io::text::{f64_mark, write_f32, write_f64, write_f64_long, write_place};
 use crate::io::{EncodeError, EncodeOptions, Encoded, Format};
 use crate::scene::Scene;
 use glam::DVec3;
@@ -25,7 +25,7 @@ pub fn encode(scene: &Scene, options: &EncodeOptions) -> Result<Encoded, EncodeE
     let facets = facets(&flat.geometry, &mut warnings)?;
     left_out(scene, &flat.geometry, &mut warnings);
     let bytes = match options.text {
-        true => text(&flat, &facets),
+        true => text(&flat, &facets, options.all_digits),
         false => binary(&flat, &facets, &mut warnings)?,
     };
     Ok(Encoded { bytes, side: Vec::new(), warnings })
@@ -159,7 +159,7 @@ fn binary(flat: &Flat<'_>, facets: &[Facet], warnings: &mut Vec<String>) -> Resu
     Ok(out)
 }
 
-fn text(flat: &Flat<'_>, facets: &[Facet]) -> Vec<u8> {
+fn text(flat: &Flat<'_>, facets: &[Facet], all_digits: bool) -> Vec<u8> {
     let positions = &flat.geometry.positions;
     let group = |f: &Facet| flat.geometry.face_group.get(f.face).copied().unwrap_or(NONE);
     let mut order: Vec<&Facet> = facets.iter().collect();
@@ -196,7 +196,7 @@ fn text(flat: &Flat<'_>, facets: &[Facet]) -> Vec<u8> {
                 for k in 0..3 {
                     out.push(b' ');
                     match positions {
-                        Positions::F32(p) => write_f32(&mut out, p[v as usize][k]),
+                        Positions::F32(p) => write_place(&mut out, p[v as usize][k], all_digits),
                         Positions::F64(p) if mark == Some((v, k)) => {
                             write_f64_long(&mut out, p[v as usize][k])
                         }
