@@ -162,6 +162,29 @@ fn a_page_plays_what_was_flown_at_every_tolerance() {
     }
 }
 
+/// With `--memory` a page plays what was flown, too.
+#[test]
+fn a_page_plays_what_was_flown_out_of_core() {
+    let p = Place::new();
+    p.generate("scan", "in.ply", 3000);
+    p.done("encode in.ply in.pm --paged --any-order -q");
+    let fly = "fly in.pm --path circle --frames 20 --tau 2 --memory 64 --geomorph=time:4 --json -q";
+    let r = p.done(&format!("{fly} --html a.html --html-taus 1,4")).json();
+    assert!(r["warnings"].to_string().contains("--html-max"), "{}", r["warnings"]);
+    let flown: Vec<u64> =
+        r["frames"].as_array().unwrap().iter().map(|f| f["faces"].as_u64().unwrap()).collect();
+    let page = p.text("a.html");
+    assert!(page.starts_with("<!DOCTYPE html>") && page.contains("<title>in.pm</title>"));
+    match played(&page) {
+        None => eprintln!("no node: the page's script was not run"),
+        Some(played) => {
+            let have: Vec<u64> =
+                played[0]["faces"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).collect();
+            assert_eq!((played.as_array().unwrap().len(), have), (2, flown));
+        }
+    }
+}
+
 #[test]
 fn a_page_that_would_be_too_large_is_refused() {
     let p = Place::new();

@@ -229,6 +229,36 @@ fn with_a_limit_of_memory_the_same_is_shown_of_fewer_bytes() {
     assert!(number(&slow["frames"][0], "faces") < number(&all["frames"][0], "faces"));
 }
 
+/// Geomorphs through `--memory` are those of the whole file, frame by frame.
+#[test]
+fn with_a_limit_of_memory_changes_morph_as_without() {
+    let p = place();
+    p.generate("scan", "in.ply", 5_000);
+    p.done("encode in.ply in.pm --paged --any-order -q");
+    let eye = |k: usize| {
+        let (sin, cos) = (0.05 * k.min(8) as f64).sin_cos();
+        CAMERA.replace("0.2, 0.3, 2.2", &format!("{}, 0.3, {}", 2.2 * sin, 2.2 * cos))
+    };
+    p.write("path.json", format!("[{}]", (0..16).map(eye).collect::<Vec<_>>().join(",")));
+    let fly = "fly in.pm --path path.json --tau 2 --measure-every 3 --samples 2000 --json -q";
+    for how in ["time:5", "error:2"] {
+        let flight = format!("{fly} --geomorph={how}");
+        let (whole, paged) = (p.done(&flight).json(), p.done(&format!("{flight} --memory 64")).json());
+        let mut morphing = 0;
+        for k in 0..16 {
+            let (a, b) = (&whole["frames"][k], &paged["frames"][k]);
+            for field in ["faces", "vertices", "vsplits", "ecols", "visible_vertices", "morphing", "measured"]
+            {
+                assert_eq!(a[field], b[field], "{field} of frame {k}, {how}");
+            }
+            morphing += b["morphing"].as_u64().unwrap();
+        }
+        assert!(morphing > 50, "{morphing}");
+        let finest = |r: &Value| r["measured_over_tau"].clone();
+        assert_eq!(finest(&whole), finest(&paged));
+    }
+}
+
 /// Truly selective: the ends are those of the other rules, between them there are fewer faces; a budget is kept, pictures are drawn.
 #[test]
 fn the_weakest_rule_shows_the_fewest_faces() {
@@ -275,7 +305,8 @@ fn what_cannot_be_read_in_parts_is_told() {
         ("extract cut.pm out.ply --camera cam.json --memory 64", 3, "shorter than it says"),
         ("extract in.pm out.ply --camera cam.json --memory 1", 3, "the limit of 1048576 bytes is too small"),
         ("extract in.pm out.ply --camera cam.json --memory 0", 2, "1 or more"),
-        ("fly in.pm --path circle --memory 64 --html a.html", 2, "--html"),
+        ("fly in.pm --path circle --memory 64 --html none/a.html", 4, "none"),
+        ("fly in.pm --path circle --memory 64 --rule truly", 2, "--rule truly"),
         ("fly in.pm --path circle --memory 64 --error directional", 2, "--error directional"),
         ("fly in.pm --path circle --fetches 2", 2, "--memory"),
     ] {

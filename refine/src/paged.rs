@@ -19,6 +19,7 @@ mod front;
 mod output;
 mod page;
 mod shelf;
+mod timed;
 
 pub use adapt::{PagedDone, PagedLimits};
 pub use shelf::Traffic;
@@ -26,11 +27,12 @@ pub use shelf::Traffic;
 use crate::aif::NONE;
 use crate::format::{ByteRanges, FormatError, RangeReader};
 use crate::progressive::{Damage, Fans};
-use crate::selective::{Clock, Cull, Entry, Lens, LensError};
+use crate::selective::{Clock, Cull, Entry, Followed, Lens, LensError, Motions};
 use crate::view::Camera;
 use glam::{DMat4, DVec3};
 use shelf::Shelf;
 use std::sync::Arc;
+use timed::{CHANGE, MOTION};
 
 /// A view that pages its mesh in has failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -80,9 +82,25 @@ pub struct PagedView<S> {
     /// Slots whose corners changed, a bit each.
     touched: Vec<u64>,
     touched_wedges: usize,
+    /// Vertices, faces and splits of what is drawn.
     vertices: usize,
     faces: usize,
     applied: usize,
+    /// Splits that are asked for, and faces of the mesh that they make. Without geomorphs by time it is what is drawn.
+    led: usize,
+    led_faces: usize,
+    /// Splits that are asked for and not yet applied.
+    pending: usize,
+    /// With geomorphs by time: vertices on the way.
+    motions: Option<Motions>,
+    /// Changes since the last step, for which there is room.
+    ahead: usize,
+    /// There was too little: the next step is made at once.
+    at_once: bool,
+    /// What was done at once since the last step, to make room.
+    jumped: Followed,
+    /// Bytes that the caller takes for every vertex shown.
+    beside: usize,
     /// Splits that could be applied next: what replaces nodes in the mesh. Their pages may not be there.
     open: Vec<Open>,
     /// Splits that could be undone next.
@@ -115,6 +133,14 @@ impl<S: ByteRanges> PagedView<S> {
             vertices,
             faces,
             applied: 0,
+            led: 0,
+            led_faces: faces,
+            pending: 0,
+            motions: None,
+            ahead: 0,
+            at_once: false,
+            jumped: Followed::default(),
+            beside: 0,
             open: Vec::new(),
             last: Vec::new(),
             queue: Default::default(),
@@ -138,6 +164,11 @@ impl<S: ByteRanges> PagedView<S> {
     /// Faces shown.
     pub fn face_count(&self) -> usize {
         self.faces
+    }
+
+    /// Faces of the mesh that was asked for last: [`PagedView::face_count`], but for what geomorphs by time still show.
+    pub fn needed_faces(&self) -> usize {
+        self.led_faces
     }
 
     /// Vertices shown.
@@ -197,6 +228,11 @@ impl<S: ByteRanges> PagedView<S> {
         self.shelf.directory_bytes()
     }
 
+    /// Splits may move the vertices that they split: a vertex that is shown can come to stand elsewhere.
+    pub fn moves_vertices(&self) -> bool {
+        self.shelf.moves
+    }
+
     /// The limit, bytes.
     pub fn limit(&self) -> usize {
         self.limit
@@ -216,6 +252,9 @@ impl<S: ByteRanges> PagedView<S> {
             + size_of::<Open>() * (self.open.capacity() + self.last.capacity())
             + 8 * self.queue.capacity()
             + 4 * self.closure.capacity()
+            + MOTION * self.motions.as_ref().map_or(0, Motions::len)
+            + CHANGE * self.ahead
+            + self.beside * self.vertices
             + size_of::<Self>()
     }
 
@@ -258,18 +297,24 @@ impl<S: ByteRanges> PagedView<S> {
         let ask = |len: usize, cap: usize, more: usize| {
             if len + more <= cap { 0 } else { (len + more).max(cap + cap / 8) + 64 }
         };
-        let slots = self.fans.corners.len() - self.free.len() + 2 * splits;
+        let slots = self.fans.corners.len() - self.free.len() + 2 * (self.pending + splits);
         let corners = ask(slots.max(self.fans.corners.len()), self.fans.corners.capacity(), 0);
         let free = ask(slots.max(self.fans.corners.len()), self.free.capacity(), 0);
-        let open = ask(self.vertices + splits, self.open.capacity(), 0);
-        let last = ask(self.applied + splits, self.last.capacity(), 0);
+        let open = ask(self.shelf.base.vertices() + self.led + splits, self.open.capacity(), 0);
+        let last = ask(self.led + splits, self.last.capacity(), 0);
         let each = size_of::<Open>();
-        let bytes = 28 * corners + 4 * free + corners / 8 + each * (open + last);
-        if bytes == 0 {
-            return true;
-        }
-        if !self.make_room(bytes) {
-            return false;
+        let bytes = 28 * corners
+            + 4 * free
+            + corners / 8
+            + each * (open + last)
+            + self.beside * (self.pending + splits);
+        let moving = if self.motions.is_some() && !self.at_once { CHANGE * splits } else { 0 };
+        if bytes + moving > 0 && !self.make_room(bytes + moving) {
+            // Better at once than not at all.
+            if moving == 0 || !self.make_room(bytes) {
+                return false;
+            }
+            self.jump();
         }
         fn grow<T>(v: &mut Vec<T>, to: usize) {
             v.reserve_exact(to.saturating_sub(v.len()));

@@ -8,7 +8,7 @@ use progmesh_refine::format::{EncodeError, EncodeOptions, FormatError, RangeRead
 use progmesh_refine::hierarchy::{self, Bounds, Hierarchy};
 use progmesh_refine::paged::{PagedError, PagedLimits, PagedView};
 use progmesh_refine::progressive::build;
-use progmesh_refine::selective::{Cull, Done, Lens, Limits, View};
+use progmesh_refine::selective::{Cull, Done, Lens, Limits, TimedMorph, View};
 use progmesh_refine::simplify::{Method, Placement, Quiet};
 use progmesh_refine::view::{Camera, CameraParameters, Projection};
 use std::sync::Arc;
@@ -150,6 +150,104 @@ fn assert_closed(view: &PagedView<&[u8]>) {
             assert!(theirs.contains(&corners[k]) && theirs.contains(&corners[(k + 1) % 3]));
         }
     }
+}
+
+/// What is drawn, and where, is what geomorphs draw in memory, frame by frame: by time and by error.
+#[test]
+fn geomorphs_are_those_in_memory_frame_by_frame() {
+    for (name, placement, faces) in
+        [("scan", Some(Placement::Endpoint), 6000), ("cad", None, 3000), ("polygons", None, 3000)]
+    {
+        let bytes = file(name, faces, placement);
+        let h = in_memory(&bytes);
+        let (centre, diagonal) = h.extent();
+        let (mut view, mut out) = (View::new(h.clone()), paged(&bytes, PLENTY));
+        let mut timed: Option<TimedMorph> = None;
+        let (mut moving, mut lingering, mut by_error) = (0, 0, 0);
+        for k in 0..16 {
+            // To and fro, so that motions are interrupted; it stands still at the end.
+            let c = camera(centre, diagonal, 0.1 * k.min(9) as f64 % 0.5, 0.9);
+            let tau = [1.5, 6.0, 2.0, 12.0][k.min(9) / 2 % 4];
+            let lens = [Lens::new(&h, &c, &DMat4::IDENTITY, tau, Cull::All).unwrap()];
+            view.adapt_to_all(&lens, &Limits::default());
+            let found = out.adapt(&lens, &PagedLimits::default()).unwrap();
+            assert!(found.done.complete && out.needed_faces() == view.face_count(), "{name} {k}");
+            let Some(t) = &mut timed else {
+                timed = Some(TimedMorph::new(&view, 5));
+                out.set_timed(Some(5)).unwrap();
+                same(&view, &out);
+                continue;
+            };
+            let (want, done) = (t.follow(&view, &lens), out.follow(&lens).unwrap());
+            assert_eq!(done, want, "{name} {k}");
+            same(t.view(), &out);
+            let places: Vec<(u32, DVec3)> = t.displaced().collect();
+            assert_eq!(out.displaced().collect::<Vec<_>>(), places, "{name} {k}");
+            assert_same(&t.view().to_input_with(&places), &out.to_input_with(&places));
+            assert_closed(&out);
+            moving += done.morphing;
+            lingering += out.face_count() - out.needed_faces();
+            if k % 5 == 0 {
+                for v in out.vertices() {
+                    let own = out.morphed_by_all(&lens, v, 2.0);
+                    by_error += usize::from(own != out.position(v));
+                    assert_eq!(own, t.view().morphed_by_all(&lens, v, 2.0));
+                }
+            }
+        }
+        assert!(moving > 100 && lingering > 100 && by_error > 20, "{name}: {moving} {lingering} {by_error}");
+        // It has stood still for long enough.
+        same(&view, &out);
+        assert_eq!((out.displaced().count(), out.needed_faces()), (0, out.face_count()));
+        // Whatever is on the way is there at once when it is told to.
+        for (tau, settle) in [(9.0, true), (1.0, false)] {
+            let lens =
+                [Lens::new(&h, &camera(centre, diagonal, 0.4, 0.9), &DMat4::IDENTITY, tau, Cull::All)
+                    .unwrap()];
+            view.adapt_to_all(&lens, &Limits::default());
+            out.adapt(&lens, &PagedLimits::default()).unwrap();
+            assert!(out.follow(&lens).unwrap().morphing > 0);
+            if settle { out.settle().map(|_| ()) } else { out.set_timed(None) }.unwrap();
+            same(&view, &out);
+            assert!(out.displaced().count() == 0);
+        }
+    }
+}
+
+/// Through little memory: it is kept, no frame is coarser than asked, and where there is no room for motions what changes jumps.
+#[test]
+fn geomorphs_keep_the_limit() {
+    let bytes = file("scan", 12_000, None);
+    let fly = |limit: usize| {
+        let mut out = PagedView::new(Arc::new(RangeReader::new(&bytes[..]).unwrap()), 0, limit).ok()?;
+        let (centre, diagonal) = out.extent();
+        let (mut most, mut moving, mut whole) = (0, 0, 0);
+        for k in 0..24 {
+            let c = camera(centre, diagonal, 0.25 * k as f64, 0.6 + 0.5 * (k / 8) as f64);
+            let lens = [out.lens(&c, &DMat4::IDENTITY, [1.0, 3.0][k / 4 % 2], Cull::All).unwrap()];
+            let done = out.adapt(&lens, &PagedLimits::default()).unwrap();
+            assert!(out.bytes() <= limit, "{} of {limit} in frame {k}", out.bytes());
+            if k == 0 {
+                out.set_timed(Some(6)).unwrap();
+            }
+            moving += out.follow(&lens).unwrap().morphing;
+            assert!(out.bytes() <= limit, "{} of {limit} in frame {k}", out.bytes());
+            assert_closed(&out);
+            whole += usize::from(done.done.complete);
+            most = most.max(out.bytes());
+        }
+        Some((most, moving, whole))
+    };
+    let (most, moving, whole) = fly(PLENTY).unwrap();
+    assert_eq!(whole, 24);
+    // What is set aside for decoding is not in what was held.
+    let (mut fewer, mut jumps) = (0, 0);
+    for part in [0.9, 0.7, 0.55, 0.45] {
+        let Some((_, less, complete)) = fly((most as f64 * part) as usize + (600 << 10)) else { continue };
+        fewer += usize::from(less < moving);
+        jumps += usize::from(less < moving && complete == 24);
+    }
+    assert!(fewer > 0 && jumps > 0, "{fewer} {jumps} of {moving}");
 }
 
 #[test]

@@ -42,7 +42,7 @@ Examples:
   progmesh fly dragon.ply --path circle --html dragon.html --html-taus 1,4
   progmesh fly alps.pm --path lemniscate --grid alps.tif --path-speed fast --measure-every 10
   progmesh fly alps.pm --path circle --grid alps.tif --cull frustum --memory 256 --measure-every 20
-  progmesh fly city.pm --path walk.json --memory 256 --fetches 2
+  progmesh fly city.pm --path walk.json --memory 256 --fetches 2 --geomorph --html walk.html
   progmesh fly dragon.ply --path circle --rule truly --measure-every 20
   progmesh fly terrain.obj --path canyon.frames --path-scale 1024 --budget-us 500
 
@@ -218,7 +218,7 @@ impl Args {
             let (measured, over) = measuring.measure(step.number, step.camera, || step.scene.triangles())?;
             shots.take(step)?;
             if let Some(p) = &mut player {
-                p.take(step)?;
+                p.take(step.number, (step.scene, step.changes), &step.timed)?;
             }
             frames.push(Frame {
                 faces: step.scene.face_count(),
@@ -247,7 +247,9 @@ impl Args {
                 scene.reset();
                 p.begin(tau, false)?;
                 let setting = self.setting(tau, interrupt);
-                fly(scene, path, setting, &file, &mut |step: &Step<'_>| p.take(step))?;
+                fly(scene, path, setting, &file, &mut |step: &Step<'_>| {
+                    p.take(step.number, (step.scene, step.changes), &step.timed)
+                })?;
             }
             p.write(scene)?;
         }

@@ -54,9 +54,12 @@ impl RuleArgs {
     pub(crate) fn check(&self, memory: bool) -> Result<(), Failure> {
         let wrong = |text: &str| Err(Failure::Usage(text.into()));
         match self.rule {
-            Some(_) if memory => {
-                wrong("--memory and --rule do not go together: what is read in parts has the rule of cuts")
-            }
+            Some(RuleName::Rings) if memory => wrong(
+                "--memory and --rule rings do not go together: what a file says for reading in parts is for the rule of cuts",
+            ),
+            Some(RuleName::Truly) if memory => wrong(
+                "--memory and --rule truly do not go together: that rule looks at parts of the mesh that are not shown, which are not read then",
+            ),
             Some(RuleName::Rings | RuleName::Cuts) if self.no_guard => {
                 wrong("--no-guard is for --rule truly")
             }

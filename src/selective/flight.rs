@@ -159,6 +159,9 @@ fn frames(text: &str, space: &FrameSpace) -> Result<FlightPath, PathError> {
         let [fx, fy, fz, _, _, _, ux, uy, uz, ex, ey, ez, zoom] = numbers[..] else {
             return Err(wrong(format!("{} numbers after the frame's, 13 are needed", numbers.len())));
         };
+        if [fx, fy, fz] == [0.0; 3] {
+            return Err(wrong("front is 0, 0, 0: it must say which way the camera looks".into()));
+        }
         let eye = space.to_world.transform_point3(space.scale * DVec3::new(ex, ey, ez));
         let [front, up] = [[fx, fy, fz], [ux, uy, uz]].map(|d| space.to_world.transform_vector3(d.into()));
         let [near, far] = space.depths;
@@ -226,6 +229,7 @@ mod tests {
             |text: &str| recorded(text.as_bytes(), &FrameSpace::about(1.0, 1.0)).unwrap_err().to_string();
         assert!(said("F 0 1 2 3\n").contains("line 1: 3 numbers"));
         assert!(said("x\nF 0 a\n").contains("line 2: a"));
+        assert!(said(&line.replace("0.6 -0.8 0 ", "0 0 0")).contains("line 1: front is 0, 0, 0"));
         assert!(said("nothing\n").contains("no frames"));
         assert!(said("[1, ").contains("line 1"));
         assert!(said("[{}]").contains("camera 0"));

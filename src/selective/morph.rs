@@ -20,6 +20,16 @@ pub enum Geomorph {
     },
 }
 
+impl Geomorph {
+    /// What tolerances are divided by.
+    pub(super) fn band(this: Option<Geomorph>) -> f64 {
+        match this {
+            Some(Geomorph::Error { band }) => band.max(1.0),
+            _ => 1.0,
+        }
+    }
+}
+
 /// The morphs of a scene's meshes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Morphs {
@@ -38,10 +48,7 @@ impl Morphs {
 
     /// What tolerances are divided by.
     pub(super) fn band(&self) -> f64 {
-        match self.geomorph {
-            Some(Geomorph::Error { band }) => band.max(1.0),
-            _ => 1.0,
-        }
+        Geomorph::band(self.geomorph)
     }
 
     /// Vertices on the way.
@@ -106,18 +113,29 @@ impl Morphs {
 
 fn displaced_by_error(view: &View, lenses: &[Lens], band: f64) -> Vec<(u32, DVec3)> {
     let all = 0..view.hierarchy().mesh().vertices() as u32;
-    all.filter_map(|v| {
-        let own = view.position(v)?;
-        let at = view.morphed_by_all(lenses, v, band)?;
-        (at != own).then_some((v, at))
-    })
-    .collect()
+    elsewhere(all, |v| view.position(v), |v| view.morphed_by_all(lenses, v, band)).collect()
 }
 
-/// Where vertex `v` is drawn.
-pub(super) fn place(view: &View, displaced: &[(u32, DVec3)], v: u32) -> Option<DVec3> {
+/// The vertices that are drawn elsewhere than in their own place, and where.
+pub(super) fn elsewhere(
+    vertices: impl Iterator<Item = u32>,
+    own: impl Fn(u32) -> Option<DVec3>,
+    drawn: impl Fn(u32) -> Option<DVec3>,
+) -> impl Iterator<Item = (u32, DVec3)> {
+    vertices.filter_map(move |v| {
+        let (own, at) = (own(v)?, drawn(v)?);
+        (at != own).then_some((v, at))
+    })
+}
+
+/// Where vertex `v` is drawn, which has a place of its own.
+pub(super) fn place(
+    displaced: &[(u32, DVec3)],
+    v: u32,
+    own: impl FnOnce(u32) -> Option<DVec3>,
+) -> Option<DVec3> {
     match displaced.binary_search_by_key(&v, |d| d.0) {
         Ok(k) => displaced.get(k).map(|d| d.1),
-        Err(_) => view.position(v),
+        Err(_) => own(v),
     }
 }

@@ -1,6 +1,7 @@
 //! A scene refined where a camera needs it, of which only what is needed is read.
 
-use super::{Deviation, places_of, shared};
+use super::shared::DrawnPages;
+use super::{Deviation, Geomorph, morph, places_of, shared};
 use crate::aif::NONE;
 use crate::io::DecodeError;
 use crate::io::grid::ReadAt;
@@ -8,7 +9,7 @@ use crate::io::pm::{self, Extent, Shelled};
 use crate::refine::format::{ByteRanges, ChunkType, FormatError, RangeReader};
 use crate::refine::hierarchy::Guarantee;
 use crate::refine::paged::{PagedDone, PagedError, PagedLimits, PagedView, Traffic};
-use crate::refine::selective::{Cull, LensError, Limits};
+use crate::refine::selective::{Cull, Lens, LensError, Limits};
 use crate::refine::view::Camera;
 use crate::scene::Scene;
 use glam::{DMat4, DVec3};
@@ -64,6 +65,23 @@ pub enum PagedSceneError {
     },
 }
 
+/// What changed of a mesh since it was last asked: what is to be uploaded.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct PagedChanges {
+    /// Runs of slots of the index buffer whose corners changed, ascending; a few unchanged ones between two may be in.
+    pub faces: Vec<Range<usize>>,
+    /// Entries of the vertex buffer that are new or have other values, at most.
+    pub wedges: usize,
+}
+
+impl PagedChanges {
+    /// Bytes of the index buffer to upload: 12 a face.
+    pub fn index_bytes(&self) -> usize {
+        self.faces.iter().map(|r| 12 * r.len()).sum()
+    }
+}
+
 /// As [`super::SelectiveScene`], of a file that is read where it is needed ([`PagedView`]). The limit of memory is for all meshes together; what stands around them (nodes, materials,
 /// images) comes on top.
 #[derive(Debug)]
@@ -73,10 +91,30 @@ pub struct PagedScene {
     places: Vec<Vec<DMat4>>,
     boxes: Vec<Option<Extent>>,
     deviation: Deviation,
+    geomorph: Option<Geomorph>,
+    /// The first frame has been shown: from then on changes take time.
+    begun: bool,
+    /// Vertices of each mesh that are not in their own place, ascending, and where they are.
+    displaced: Vec<Vec<(u32, DVec3)>>,
+    morphing: usize,
+    reader: Arc<RangeReader<Ranges>>,
     limit: usize,
     file_bytes: u64,
     shell_bytes: u64,
     chunks: usize,
+}
+
+/// Views of all meshes of a file, which show their bases.
+fn bases(reader: &Arc<RangeReader<Ranges>>, limit: usize) -> Result<Vec<PagedView<Ranges>>, PagedSceneError> {
+    let mut views: Vec<PagedView<Ranges>> = Vec::new();
+    let mut held = 0;
+    for mesh in 0..reader.directory().meshes as usize {
+        let view = PagedView::new(reader.clone(), mesh as u32, limit.saturating_sub(held));
+        let view = view.map_err(|source| PagedSceneError::Mesh { mesh, source })?;
+        held += view.bytes();
+        views.push(view);
+    }
+    Ok(views)
 }
 
 impl PagedScene {
@@ -100,14 +138,7 @@ impl PagedScene {
         let shell_bytes = of_scene.map_or(0, |c| c.stored);
         let Shelled { scene: shell, boxes, .. } = pm::shell(bytes.as_deref(), meshes)?;
         let chunks = directory.chunks.iter().filter(|c| c.kind == ChunkType::SPLITS).count();
-        let mut views: Vec<PagedView<Ranges>> = Vec::new();
-        let mut held = 0;
-        for mesh in 0..meshes {
-            let view = PagedView::new(reader.clone(), mesh as u32, limit.saturating_sub(held));
-            let view = view.map_err(|source| PagedSceneError::Mesh { mesh, source })?;
-            held += view.bytes();
-            views.push(view);
-        }
+        let views = bases(&reader, limit)?;
         let places = places_of(&shell, meshes);
         Ok(PagedScene {
             shell,
@@ -115,11 +146,64 @@ impl PagedScene {
             places,
             boxes,
             deviation: Deviation::Uniform,
+            geomorph: None,
+            begun: false,
+            displaced: vec![Vec::new(); meshes],
+            morphing: 0,
+            reader,
             limit,
             file_bytes,
             shell_bytes,
             chunks,
         })
+    }
+
+    /// Back to the bases, as if nothing had been shown or read.
+    ///
+    /// Errors: as [`PagedScene::new`].
+    pub fn reset(&mut self) -> Result<(), PagedSceneError> {
+        self.views.clear();
+        self.displaced.iter_mut().for_each(|d| *d = Vec::new());
+        self.views = bases(&self.reader, self.limit)?;
+        self.set_geomorph(self.geomorph)
+    }
+
+    /// From the next frame on changes that can be seen show themselves so, as those of [`super::SelectiveScene::set_geomorph`] do; `None`: at once. What that takes is within the limit of memory; where
+    /// there is too little left of it, the changes of a frame by [`Geomorph::Time`] are made at once.
+    ///
+    /// Errors: damage, while what is still on the way is made.
+    pub fn set_geomorph(&mut self, geomorph: Option<Geomorph>) -> Result<(), PagedSceneError> {
+        let beside = match geomorph {
+            Some(Geomorph::Error { .. }) => size_of::<(u32, DVec3)>(),
+            _ => 0,
+        };
+        for (mesh, view) in self.views.iter_mut().enumerate() {
+            view.set_timed(None).map_err(|source| PagedSceneError::Mesh { mesh, source })?;
+            view.set_beside(beside);
+        }
+        (self.geomorph, self.begun, self.morphing) = (geomorph, false, 0);
+        self.displaced.iter_mut().for_each(|d| *d = Vec::new());
+        Ok(())
+    }
+
+    /// Vertices of the last frame that are not where they will be.
+    pub fn morphing(&self) -> usize {
+        self.morphing
+    }
+
+    /// The vertices of mesh `m` that are drawn elsewhere than its view has them, ascending, and where, in the mesh's own coordinates; of no such mesh none.
+    pub fn displaced(&self, m: usize) -> &[(u32, DVec3)] {
+        self.displaced.get(m).map_or(&[], Vec::as_slice)
+    }
+
+    /// The meshes as they are drawn.
+    fn drawn(&self) -> impl Iterator<Item = DrawnPages<'_>> {
+        self.views.iter().zip(&self.displaced).map(|(view, displaced)| DrawnPages { view, displaced })
+    }
+
+    /// Where each mesh stands.
+    pub fn placements(&self) -> &[Vec<DMat4>] {
+        &self.places
     }
 
     /// The views, one a mesh.
@@ -134,12 +218,17 @@ impl PagedScene {
 
     /// Faces shown, of all meshes, each counted once.
     pub fn face_count(&self) -> usize {
-        shared::face_count(self.views.iter())
+        shared::face_count(self.drawn())
+    }
+
+    /// Faces that the last frame asked for: [`PagedScene::face_count`], but for what [`Geomorph::Time`] still shows.
+    pub fn needed_faces(&self) -> usize {
+        self.views.iter().map(PagedView::needed_faces).sum()
     }
 
     /// Vertices shown.
     pub fn vertex_count(&self) -> usize {
-        shared::vertex_count(self.views.iter())
+        shared::vertex_count(self.drawn())
     }
 
     /// Splits applied.
@@ -233,6 +322,8 @@ impl PagedScene {
         limits: &PagedLimits<'_>,
     ) -> Result<PagedDone, PagedSceneError> {
         let mut all = PagedDone::NOTHING;
+        let tau = tau / Geomorph::band(self.geomorph);
+        let mut seen_by = Vec::with_capacity(self.views.len());
         for mesh in 0..self.views.len() {
             let lens = |p: &DMat4| {
                 let lens = self.views[mesh].lens(camera, p, tau, cull)?;
@@ -241,7 +332,7 @@ impl PagedScene {
             };
             let failed = |source| PagedSceneError::Lens { mesh, source };
             let lenses = shared::lenses(&self.places[mesh], lens, failed)?;
-            let others = self.face_count() - self.views[mesh].face_count();
+            let others = self.needed_faces() - self.views[mesh].needed_faces();
             let faces = limits.limits.faces.saturating_sub(others);
             // Once with what is free, and if that is too little, once more with what others can spare.
             for attempt in 0..2 {
@@ -263,8 +354,51 @@ impl PagedScene {
                 all += done;
                 break;
             }
+            seen_by.push(lenses);
+        }
+        if let Some([splits, collapses]) = self.follow(&seen_by)? {
+            (all.done.splits, all.done.collapses) = (splits, collapses);
         }
         Ok(all)
+    }
+
+    /// Draws a frame as geomorphs have it. Returns splits and collapses of what is drawn, if that is not what was asked for.
+    fn follow(&mut self, lenses: &[Vec<Lens>]) -> Result<Option<[usize; 2]>, PagedSceneError> {
+        let failed = |mesh: usize| move |source| PagedSceneError::Mesh { mesh, source };
+        match self.geomorph {
+            None => Ok(None),
+            Some(Geomorph::Error { band }) => {
+                for ((view, displaced), lenses) in self.views.iter().zip(&mut self.displaced).zip(lenses) {
+                    // No more than was set aside for it.
+                    *displaced = Vec::new();
+                    displaced.reserve_exact(view.vertex_count());
+                    let drawn = |v| view.morphed_by_all(lenses, v, band);
+                    displaced.extend(morph::elsewhere(view.vertices(), |v| view.position(v), drawn));
+                }
+                self.morphing = self.displaced.iter().map(Vec::len).sum();
+                Ok(None)
+            }
+            // The first frame shows what it asks for.
+            Some(Geomorph::Time { frames }) if !self.begun => {
+                for (mesh, view) in self.views.iter_mut().enumerate() {
+                    view.set_timed(Some(frames)).map_err(failed(mesh))?;
+                }
+                self.begun = true;
+                Ok(None)
+            }
+            Some(Geomorph::Time { .. }) => {
+                let mut sum = [0; 2];
+                self.morphing = 0;
+                for (mesh, (view, lenses)) in self.views.iter_mut().zip(lenses).enumerate() {
+                    self.displaced[mesh] = Vec::new();
+                    let done = view.follow(lenses).map_err(failed(mesh))?;
+                    sum = [sum[0] + done.splits, sum[1] + done.collapses];
+                    self.morphing += done.morphing;
+                    self.displaced[mesh] = view.displaced().collect();
+                }
+                Ok(Some(sum))
+            }
+        }
     }
 
     /// Adapts to a camera at `tau`, or at the least tolerance above it with which at most `faces` faces are shown and what the camera needs fits into the memory. Returns that tolerance;
@@ -283,12 +417,10 @@ impl PagedScene {
         shared::extract(self, (tau, faces), adapt, Self::face_count)
     }
 
-    /// Bytes of the index buffers, and entries of the vertex buffers, that changed since this was last called.
-    pub fn take_changes(&mut self) -> (usize, usize) {
+    /// What changed in the buffers of each mesh since this was last called.
+    pub fn take_changes(&mut self) -> Vec<PagedChanges> {
         let each = self.views.iter_mut().map(PagedView::take_changes);
-        each.fold((0, 0), |(bytes, wedges), (runs, w)| {
-            (bytes + runs.iter().map(|r| 12 * r.len()).sum::<usize>(), wedges + w)
-        })
+        each.map(|(faces, wedges)| PagedChanges { faces, wedges }).collect()
     }
 
     /// The scene as it is shown. O(n shown); the memory it takes comes on top of the limit.
@@ -296,8 +428,8 @@ impl PagedScene {
         let mut scene = self.shell.clone();
         scene.meshes.resize_with(self.views.len(), Default::default);
         let materials = scene.materials.len() as u32;
-        for (mesh, view) in scene.meshes.iter_mut().zip(&self.views) {
-            let mut geometry = view.to_input();
+        for (mesh, drawn) in scene.meshes.iter_mut().zip(self.drawn()) {
+            let mut geometry = drawn.view.to_input_with(drawn.displaced);
             // What the file's pages name is known only now.
             geometry.face_material.iter_mut().filter(|m| **m >= materials).for_each(|m| *m = NONE);
             let groups = mesh.groups.len() as u32;
@@ -311,11 +443,11 @@ impl PagedScene {
 
     /// The triangles shown, in the world: three corners each. What this takes comes on top of the limit.
     pub fn triangles(&self) -> Vec<[DVec3; 3]> {
-        shared::triangles(self.views.iter(), &self.places)
+        shared::triangles(self.drawn(), &self.places)
     }
 
     /// Vertices that a camera's frustum holds, of those shown, places counted each.
     pub fn visible_vertices(&self, camera: &Camera) -> usize {
-        shared::visible_vertices(self.views.iter(), &self.places, camera)
+        shared::visible_vertices(self.drawn(), &self.places, camera)
     }
 }

@@ -10,8 +10,9 @@
 //!
 //! A slot without a face has three equal corners. Vertices and places are numbered in the order in which they come up, over all tracks.
 
-use super::{SelectiveScene, morph};
-use crate::refine::selective::Changes;
+use super::Recordable;
+#[cfg(doc)]
+use super::{PagedScene, SelectiveScene};
 use crate::refine::view::{Camera, Projection};
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
@@ -92,8 +93,7 @@ pub struct Recorder {
 #[derive(Debug)]
 struct Table {
     origin: DVec3,
-    number: Vec<u32>,
-    vertices: u32,
+    number: FxHashMap<u32, u32>,
     place: FxHashMap<[u32; 3], u32>,
     places: Vec<[f32; 3]>,
 }
@@ -105,6 +105,8 @@ struct Shadow {
     at: Vec<u32>,
     slots: Vec<Range<usize>>,
     vertices: Vec<u32>,
+    /// Any vertex may be elsewhere.
+    any: bool,
     displaced: Vec<u32>,
 }
 
@@ -120,12 +122,8 @@ struct Track {
 
 impl Table {
     fn vertex(&mut self, v: u32) -> u32 {
-        let Some(number) = self.number.get_mut(v as usize) else { return NONE };
-        if *number == NONE {
-            *number = self.vertices;
-            self.vertices += 1;
-        }
-        *number
+        let next = self.number.len() as u32;
+        *self.number.entry(v).or_insert(next)
     }
 
     fn place(&mut self, p: DVec3) -> u32 {
@@ -141,23 +139,25 @@ impl Table {
 
 impl Recorder {
     /// For a flight of `scene` along `path`, of which every `stride`-th frame will be recorded, in at most `limit` bytes. `name` is what the scene is called.
-    pub fn new(scene: &SelectiveScene, path: &[Camera], stride: usize, limit: usize, name: &str) -> Recorder {
-        let table = |m: usize| {
-            let view = &scene.views()[m];
-            Table {
-                origin: view.hierarchy().extent().0,
-                number: vec![NONE; view.hierarchy().mesh().vertices()],
-                vertices: 0,
-                place: FxHashMap::default(),
-                places: Vec::new(),
-            }
+    pub fn new<R: Recordable>(
+        scene: &R,
+        path: &[Camera],
+        stride: usize,
+        limit: usize,
+        name: &str,
+    ) -> Recorder {
+        let table = |m: usize| Table {
+            origin: scene.origin(m),
+            number: FxHashMap::default(),
+            place: FxHashMap::default(),
+            places: Vec::new(),
         };
         let cameras: Vec<Value> = path.iter().step_by(stride.max(1)).map(camera).collect();
         let (lo, hi) = scene.bounds().unwrap_or_default();
         let up = path.iter().map(Camera::up).sum::<DVec3>();
         Recorder {
             limit,
-            tables: (0..scene.views().len()).map(table).collect(),
+            tables: (0..scene.meshes()).map(table).collect(),
             header: json!({
                 "name": name,
                 "full_faces": scene.full_faces(),
@@ -186,13 +186,15 @@ impl Recorder {
         Ok(())
     }
 
-    /// Takes note of what changed in a frame ([`SelectiveScene::take_changes`]), recorded or not.
-    pub fn note(&mut self, scene: &SelectiveScene, changes: &[Changes]) {
+    /// Takes note of what changed in a frame ([`SelectiveScene::take_changes`], [`PagedScene::take_changes`]), recorded or not.
+    pub fn note<R: Recordable>(&mut self, scene: &R, changes: &[R::Changes]) {
         let Some(track) = &mut self.track else { return };
         for (m, (shadow, changes)) in track.shadows.iter_mut().zip(changes).enumerate() {
-            shadow.slots.extend(changes.faces.iter().cloned());
-            let view = scene.shown(m);
-            shadow.vertices.extend(changes.wedges.iter().map(|&w| view.wedge_vertex(w)));
+            shadow.slots.extend(scene.changed_slots(changes).iter().cloned());
+            match scene.changed_vertices(m, changes) {
+                Some(vertices) => shadow.vertices.extend(vertices),
+                None => shadow.any = true,
+            }
             shadow.vertices.extend(scene.displaced(m).iter().map(|d| d.0));
         }
     }
@@ -200,7 +202,7 @@ impl Recorder {
     /// Records what `scene` shows. O(what changed since the last frame recorded).
     ///
     /// Errors: the limit is passed.
-    pub fn frame(&mut self, scene: &SelectiveScene, counts: &FrameCounts) -> Result<(), RecordError> {
+    pub fn frame<R: Recordable>(&mut self, scene: &R, counts: &FrameCounts) -> Result<(), RecordError> {
         let Some(track) = &mut self.track else { return Ok(()) };
         let mut bytes = Vec::new();
         for (m, (shadow, table)) in track.shadows.iter_mut().zip(&mut self.tables).enumerate() {
@@ -254,7 +256,7 @@ impl Recorder {
     /// The recording.
     ///
     /// Errors: it passes the limit after all.
-    pub fn finish(mut self, scene: &SelectiveScene) -> Result<Recording, RecordError> {
+    pub fn finish<R: Recordable>(mut self, scene: &R) -> Result<Recording, RecordError> {
         let last = self.track.as_ref().map_or((0, 0.0), |t| (t.counts.len().saturating_sub(1), t.tau));
         self.end()?;
         let pack = |bytes: &[u8]| {
@@ -268,7 +270,7 @@ impl Recorder {
             .map(|(t, placed)| {
                 let placed: Vec<_> = placed.iter().map(|m| m.to_cols_array()).collect();
                 json!({
-                    "vertices": t.vertices,
+                    "vertices": t.number.len(),
                     "places": t.places.len(),
                     "origin": t.origin.to_array(),
                     "instances": placed,
@@ -298,9 +300,15 @@ impl Recorder {
 }
 
 impl Shadow {
-    fn write(&mut self, scene: &SelectiveScene, m: usize, table: &mut Table, first: bool, out: &mut Vec<u8>) {
-        let (view, displaced) = (scene.shown(m), scene.displaced(m));
-        let slots = view.indices().len();
+    fn write<R: Recordable>(
+        &mut self,
+        scene: &R,
+        m: usize,
+        table: &mut Table,
+        first: bool,
+        out: &mut Vec<u8>,
+    ) {
+        let slots = scene.slots(m);
         let mut changed = std::mem::take(&mut self.slots);
         if first {
             changed.clear();
@@ -310,8 +318,11 @@ impl Shadow {
         let mut vertices = std::mem::take(&mut self.vertices);
         // Those that are back in their own place.
         vertices.append(&mut self.displaced);
-        self.displaced.extend(displaced.iter().map(|d| d.0));
+        self.displaced.extend(scene.displaced(m).iter().map(|d| d.0));
         vertices.extend_from_slice(&self.displaced);
+        if std::mem::take(&mut self.any) {
+            vertices.append(&mut scene.vertices(m));
+        }
 
         number(out, slots as u64);
         self.corners.resize(slots, [0; 3]);
@@ -320,10 +331,7 @@ impl Shadow {
         let mut from = 0;
         for run in changed {
             for slot in run.start.max(from)..run.end.min(slots) {
-                let corners = match view.face_in(slot) {
-                    Some(_) => view.indices()[slot].map(|w| view.wedge_vertex(w)),
-                    None => [NONE; 3],
-                };
+                let corners = scene.corners(m, slot).unwrap_or([NONE; 3]);
                 let own = corners.map(|v| if v == NONE { 0 } else { table.vertex(v) });
                 if own == self.corners[slot] && !first {
                     continue;
@@ -345,12 +353,11 @@ impl Shadow {
         vertices.sort_unstable();
         vertices.dedup();
         let mut moved: Vec<[u32; 2]> = Vec::new();
-        self.at.resize(table.number.len(), NONE);
         for v in vertices {
             // Wedges that are gone again may have no vertex.
-            let known = (v as usize) < table.number.len();
-            let Some(p) = known.then(|| morph::place(view, displaced, v)).flatten() else { continue };
+            let Some(p) = scene.place(m, v) else { continue };
             let (id, place) = (table.vertex(v), table.place(p));
+            self.at.resize(table.number.len().max(self.at.len()), NONE);
             if self.at[id as usize] != place {
                 self.at[id as usize] = place;
                 moved.push([id, place]);
@@ -412,20 +419,60 @@ fn camera(c: &Camera) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::grid::ReadAt;
+    use crate::io::pm::encode_progressive;
     use crate::meshes::{GenerateOptions, generate};
     use crate::pipeline::{Job, build_progressive};
-    use crate::refine::hierarchy::Options;
+    use crate::progressive::ProgressiveScene;
+    use crate::refine::format::EncodeOptions;
+    use crate::refine::hierarchy::{Bounds, Options};
+    use crate::refine::paged::PagedLimits;
+    use crate::refine::selective::Changes;
     use crate::refine::selective::{Cull, Limits};
     use crate::selective::{FlightPath, Geomorph, circle};
+    use crate::selective::{PagedChanges, PagedScene, SelectiveScene};
     use std::io::Read;
+    use std::sync::Arc;
 
-    fn flown(name: &str, faces: usize) -> (SelectiveScene, FlightPath) {
+    fn built(name: &str, faces: usize) -> ProgressiveScene {
         let sample = generate(name, &GenerateOptions::default().with_faces(faces)).unwrap();
         let scene = crate::samples::scene(sample, name);
-        let built = build_progressive(scene, &Job::default(), &crate::simplify::Quiet).unwrap();
-        let scene = SelectiveScene::new(built.scene, &Options::default()).unwrap();
+        build_progressive(scene, &Job::default(), &crate::simplify::Quiet).unwrap().scene
+    }
+
+    fn flown(name: &str, faces: usize) -> (SelectiveScene, FlightPath) {
+        let scene = SelectiveScene::new(built(name, faces), &Options::default()).unwrap();
         let path = circle(scene.bounds().unwrap(), 14).unwrap();
         (scene, path)
+    }
+
+    /// A scene that can be flown through.
+    trait Flyable: Recordable {
+        fn again(&mut self);
+        /// A frame: splits, collapses, changes.
+        fn step(&mut self, camera: &Camera, tau: f64) -> (usize, usize, Vec<Self::Changes>);
+    }
+
+    impl Flyable for SelectiveScene {
+        fn again(&mut self) {
+            self.reset();
+        }
+
+        fn step(&mut self, camera: &Camera, tau: f64) -> (usize, usize, Vec<Changes>) {
+            let done = self.adapt(camera, tau, Cull::All, &Limits::default()).unwrap();
+            (done.splits, done.collapses, self.take_changes())
+        }
+    }
+
+    impl Flyable for PagedScene {
+        fn again(&mut self) {
+            self.reset().unwrap();
+        }
+
+        fn step(&mut self, camera: &Camera, tau: f64) -> (usize, usize, Vec<PagedChanges>) {
+            let done = self.adapt(camera, tau, Cull::All, &PagedLimits::default()).unwrap().done;
+            (done.splits, done.collapses, self.take_changes())
+        }
     }
 
     fn unpack(bytes: &[u8]) -> Vec<u8> {
@@ -486,16 +533,16 @@ mod tests {
     type Triangles = Vec<[[u32; 3]; 3]>;
 
     /// The triangles that a scene shows, places as a recording has them, the least corner first.
-    fn shown(scene: &SelectiveScene) -> Triangles {
+    fn shown(scene: &impl Recordable) -> Triangles {
         let mut out = Vec::new();
-        for m in 0..scene.views().len() {
-            let (view, origin) = (scene.shown(m), scene.shown(m).hierarchy().extent().0);
-            let at = |w: u32| {
-                let p = morph::place(view, scene.displaced(m), view.wedge_vertex(w)).unwrap() - origin;
+        for m in 0..scene.meshes() {
+            let origin = scene.origin(m);
+            let at = |v: u32| {
+                let p = scene.place(m, v).unwrap() - origin;
                 p.as_vec3().to_array().map(f32::to_bits)
             };
-            let slots = (0..view.indices().len()).filter(|&s| view.face_in(s).is_some());
-            out.extend(slots.map(|s| turned(view.indices()[s].map(at))));
+            let faces = (0..scene.slots(m)).filter_map(|s| scene.corners(m, s));
+            out.extend(faces.map(|f| turned(f.map(at))));
         }
         out.sort_unstable();
         out
@@ -508,7 +555,7 @@ mod tests {
     }
 
     fn record(
-        scene: &mut SelectiveScene,
+        scene: &mut impl Flyable,
         path: &[Camera],
         stride: usize,
         limit: usize,
@@ -517,14 +564,13 @@ mod tests {
         let mut all = Vec::new();
         for tau in [4.0, 1.0] {
             // Recorded in this order, kept in the other.
-            scene.reset();
+            scene.again();
             recorder.begin(tau, tau == 1.0).unwrap();
             let mut frames = Vec::new();
             for (k, c) in path.iter().enumerate() {
-                let done = scene.adapt(c, tau, Cull::All, &Limits::default()).unwrap();
-                let changes = scene.take_changes();
+                let (splits, collapses, changes) = scene.step(c, tau);
                 recorder.note(scene, &changes);
-                let counts = FrameCounts { splits: done.splits, collapses: done.collapses, tau };
+                let counts = FrameCounts { splits, collapses, tau };
                 if k % stride != 0 {
                     recorder.skip(&counts);
                     continue;
@@ -550,52 +596,78 @@ mod tests {
         ] {
             let (mut scene, path) = flown(name, 1500);
             scene.set_geomorph(geomorph);
-            let (recording, frames) = record(&mut scene, &path, stride, 1 << 30);
-            let blocks: Vec<Vec<u8>> = recording.unwrap().blocks.iter().map(|b| unpack(b)).collect();
-            let header: Value = serde_json::from_slice(&blocks[0]).unwrap();
-            assert_eq!(blocks.len(), 1 + 2 + scene.views().len());
-            let n = |v: &Value| v.as_u64().unwrap() as usize;
-            let places: Vec<Vec<[u32; 3]>> = header["meshes"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .zip(&blocks[3..])
-                .map(|(m, b)| {
-                    let count = n(&m["places"]);
-                    assert_eq!(b.len(), 12 * count);
-                    let part = |i: usize, axis: usize| {
-                        u32::from_le_bytes([0, 1, 2, 3].map(|k| b[(4 * axis + k) * count + i]))
-                    };
-                    (0..count).map(|i| [0, 1, 2].map(|axis| part(i, axis))).collect()
-                })
-                .collect();
-            let mut bytes = 0;
-            for (t, want) in frames.iter().rev().enumerate() {
-                assert_eq!(header["tracks"][t]["tau"], [1.0, 4.0][t]);
-                let meshes = header["meshes"].as_array().unwrap();
-                let mut player = Player {
-                    bytes: &blocks[1 + t],
-                    meshes: meshes.iter().map(|m| (vec![], vec![0; n(&m["vertices"])])).collect(),
-                };
-                assert_eq!(want.len(), path.len().div_ceil(stride));
-                for (k, want) in want.iter().enumerate() {
-                    player.step();
-                    let mut have = Vec::new();
-                    for ((corners, at), places) in player.meshes.iter().zip(&places) {
-                        let whole = corners.iter().filter(|c| c[0] != c[1]);
-                        have.extend(whole.map(|c| turned(c.map(|v| places[at[v as usize] as usize]))));
-                    }
-                    have.sort_unstable();
-                    assert!(have == *want, "{name}: frame {k} of track {t}");
-                    assert_eq!(n(&header["tracks"][t]["counts"][k][0]), want.len());
-                }
-                assert!(player.bytes.is_empty());
-                bytes += blocks[1 + t].len();
-            }
-            // Less than all indices of all frames by far.
-            let all: usize = frames.iter().flatten().map(|f| 12 * f.len()).sum();
-            assert!(geomorph.is_some() || bytes * 3 < all, "{name}: {bytes} of {all}");
+            plays(name, &mut scene, &path, stride, geomorph.is_none());
         }
+    }
+
+    #[test]
+    fn what_is_shown_out_of_core_is_played_as_well() {
+        for (name, geomorph) in [("scan", Some(Geomorph::Time { frames: 3 })), ("cad", None)] {
+            let mut scene = built(name, 1500);
+            let path = circle(
+                SelectiveScene::new(scene.clone(), &Options::CUTS.with_rounds(0)).unwrap().bounds().unwrap(),
+                14,
+            )
+            .unwrap();
+            for m in &mut scene.meshes {
+                m.bounds = Some(Bounds::measure(m, &Options::CUTS.with_rounds(0)).unwrap().into());
+            }
+            let options =
+                EncodeOptions::default().with_any_order(true).with_pages(true).with_chunk(Some(128));
+            let bytes: Arc<dyn ReadAt> = Arc::new(encode_progressive(&scene, &options).unwrap());
+            let mut scene = PagedScene::new(bytes, 1 << 28).unwrap();
+            scene.set_geomorph(geomorph).unwrap();
+            plays(name, &mut scene, &path, 2, false);
+        }
+    }
+
+    /// What is recorded of two flights is what was shown. `coherent`: and takes far less than all of it.
+    fn plays(name: &str, scene: &mut impl Flyable, path: &[Camera], stride: usize, coherent: bool) {
+        let (recording, frames) = record(scene, path, stride, 1 << 30);
+        let blocks: Vec<Vec<u8>> = recording.unwrap().blocks.iter().map(|b| unpack(b)).collect();
+        let header: Value = serde_json::from_slice(&blocks[0]).unwrap();
+        assert_eq!(blocks.len(), 1 + 2 + scene.meshes());
+        let n = |v: &Value| v.as_u64().unwrap() as usize;
+        let places: Vec<Vec<[u32; 3]>> = header["meshes"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .zip(&blocks[3..])
+            .map(|(m, b)| {
+                let count = n(&m["places"]);
+                assert_eq!(b.len(), 12 * count);
+                let part = |i: usize, axis: usize| {
+                    u32::from_le_bytes([0, 1, 2, 3].map(|k| b[(4 * axis + k) * count + i]))
+                };
+                (0..count).map(|i| [0, 1, 2].map(|axis| part(i, axis))).collect()
+            })
+            .collect();
+        let mut bytes = 0;
+        for (t, want) in frames.iter().rev().enumerate() {
+            assert_eq!(header["tracks"][t]["tau"], [1.0, 4.0][t]);
+            let meshes = header["meshes"].as_array().unwrap();
+            let mut player = Player {
+                bytes: &blocks[1 + t],
+                meshes: meshes.iter().map(|m| (vec![], vec![0; n(&m["vertices"])])).collect(),
+            };
+            assert_eq!(want.len(), path.len().div_ceil(stride));
+            for (k, want) in want.iter().enumerate() {
+                player.step();
+                let mut have = Vec::new();
+                for ((corners, at), places) in player.meshes.iter().zip(&places) {
+                    let whole = corners.iter().filter(|c| c[0] != c[1]);
+                    have.extend(whole.map(|c| turned(c.map(|v| places[at[v as usize] as usize]))));
+                }
+                have.sort_unstable();
+                assert!(have == *want, "{name}: frame {k} of track {t}");
+                assert_eq!(n(&header["tracks"][t]["counts"][k][0]), want.len());
+            }
+            assert!(player.bytes.is_empty());
+            bytes += blocks[1 + t].len();
+        }
+        // Less than all indices of all frames by far.
+        let all: usize = frames.iter().flatten().map(|f| 12 * f.len()).sum();
+        assert!(!coherent || bytes * 3 < all, "{name}: {bytes} of {all}");
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub(super) struct Drawn<'a> {
 
 impl Drawn<'_> {
     fn place(&self, v: u32) -> Option<DVec3> {
-        morph::place(self.view, self.displaced, v)
+        morph::place(self.displaced, v, |v| self.view.position(v))
     }
 }
 
@@ -119,22 +119,34 @@ impl Whole for &TrulyView {
     }
 }
 
-impl Shown for &PagedView<Ranges> {
+/// A view of a file, and the vertices that are drawn elsewhere.
+pub(super) struct DrawnPages<'a> {
+    pub(super) view: &'a PagedView<Ranges>,
+    pub(super) displaced: &'a [(u32, DVec3)],
+}
+
+impl DrawnPages<'_> {
+    fn place(&self, v: u32) -> Option<DVec3> {
+        morph::place(self.displaced, v, |v| self.view.position(v))
+    }
+}
+
+impl Shown for DrawnPages<'_> {
     fn faces(&self) -> usize {
-        self.face_count()
+        self.view.face_count()
     }
 
     fn vertices(&self) -> usize {
-        self.vertex_count()
+        self.view.vertex_count()
     }
 
     fn places(&self) -> impl Iterator<Item = DVec3> {
-        PagedView::vertices(self).filter_map(|v| self.position(v))
+        self.view.vertices().filter_map(|v| self.place(v))
     }
 
     fn triangles(&self) -> impl Iterator<Item = [DVec3; 3]> {
-        let at = |w: u32| self.position(self.wedge_vertex(w)).unwrap_or_default();
-        corners(self.indices(), |s| self.face_in(s).is_some()).map(move |f| f.map(at))
+        let at = |w: u32| self.place(self.view.wedge_vertex(w)).unwrap_or_default();
+        corners(self.view.indices(), |s| self.view.face_in(s).is_some()).map(move |f| f.map(at))
     }
 }
 

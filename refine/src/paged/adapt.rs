@@ -1,7 +1,8 @@
 //! From the mesh of the last frame to that of this one, fetching what it needs.
 
-use super::page::APPLIED;
+use super::page::LED;
 use super::shelf::Fetch;
+use super::timed::CHANGE;
 use super::{PagedError, PagedView};
 use crate::aif::NONE;
 use crate::format::ByteRanges;
@@ -96,7 +97,12 @@ impl<S: ByteRanges> PagedView<S> {
         let cut = std::mem::replace(&mut self.cut, true);
         let all = cut || !stands;
         self.coarsen(&judges, all, &mut frame)?;
-        if !frame.meter.over {
+        // Once more without what lingers, if it takes the room.
+        for attempt in 0..2 {
+            if frame.meter.over || (attempt > 0 && (frame.all.no_room == 0 || !self.make_way()?)) {
+                break;
+            }
+            frame.all.no_room = 0;
             let result = self.refine(&judges, all, &mut frame);
             self.queue.clear();
             result?;
@@ -169,14 +175,14 @@ impl<S: ByteRanges> PagedView<S> {
         self.resume[1] = at;
         frame.whole &= whole;
         while let Some((_, Reverse(i))) = self.queue.pop() {
-            if self.shelf.is_applied(i) {
+            if self.shelf.is_led(i) {
                 continue;
             }
             if !frame.meter.goes_on() {
                 return Ok(());
             }
             // Nor is anything fetched for it then.
-            if frame.meter.is_full(self.faces) {
+            if frame.meter.is_full(self.led_faces) {
                 frame.meter.done.refused += 1 + self.queue.len();
                 return Ok(());
             }
@@ -213,7 +219,7 @@ impl<S: ByteRanges> PagedView<S> {
     ) -> Result<(), PagedError> {
         let two = |j: u32| self.shelf.page(j).is_some_and(|(p, k)| p.code[k].two_faces());
         let more: usize = closure.iter().map(|&j| 1 + two(j) as usize).sum();
-        if self.faces + more > frame.meter.limits.faces {
+        if self.led_faces + more > frame.meter.limits.faces {
             frame.meter.done.refused += 1;
             return Ok(());
         }
@@ -274,7 +280,7 @@ impl<S: ByteRanges> PagedView<S> {
             self.shelf.mark(j, true);
             let needs = self.shelf.needs(j).ok_or(Damage::Fan(j as usize))?;
             for d in needs.into_iter().filter(|&d| d != NONE) {
-                if self.shelf.is_applied(d) || self.shelf.is_marked(d) {
+                if self.shelf.is_led(d) || self.shelf.is_marked(d) {
                     continue;
                 }
                 // Marked as soon as its page is there; until then it may be listed again.
@@ -291,15 +297,19 @@ impl<S: ByteRanges> PagedView<S> {
     }
 
     fn is_free(&self, i: u32) -> bool {
-        self.shelf.page(i).is_some_and(|(p, k)| p.flags[k] & APPLIED != 0 && p.dependents[k] == 0)
+        self.shelf.page(i).is_some_and(|(p, k)| p.flags[k] & LED != 0 && p.dependents[k] == 0)
     }
 
-    /// Applies split `i`, whose page is there, whose dependencies are applied, and for which there is room.
+    /// Asks for split `i`, whose page is there, whose dependencies are asked for, and for which there is room; with geomorphs by time it is applied later.
     fn apply(&mut self, i: u32) -> Result<(), PagedError> {
-        self.split_faces(i)?;
+        let needs = self.can_count(i, |p| &p.dependents)?;
         let (node, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
+        if self.motions.is_none() {
+            self.split_faces(i)?;
+        }
+        self.lead(i, true);
         self.withdraw(node);
-        for d in self.shelf.needs(i).into_iter().flatten().filter(|&d| d != NONE) {
+        for d in needs.into_iter().filter(|&d| d != NONE) {
             self.hold_split(d);
         }
         self.free_split(i)?;
@@ -308,7 +318,7 @@ impl<S: ByteRanges> PagedView<S> {
         self.offer(old + 1)
     }
 
-    /// Undoes split `i`, which is applied and free; returns what it depended on.
+    /// No longer asks for split `i`, on which nothing that is depends; returns what it depended on.
     fn undo(&mut self, i: u32) -> Result<[u32; 3], PagedError> {
         let needs = self.shelf.needs(i).ok_or(Damage::Fan(i as usize))?;
         let (node, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
@@ -316,7 +326,12 @@ impl<S: ByteRanges> PagedView<S> {
         self.withdraw(old);
         self.withdraw(old + 1);
         self.hold_split(i);
-        self.unsplit_faces(i)?;
+        if self.motions.is_none() {
+            self.unsplit_faces(i)?;
+        } else if !self.at_once && !self.make_room(CHANGE) {
+            self.jump();
+        }
+        self.lead(i, false);
         self.offer(node)?;
         for d in needs {
             if d != NONE && self.is_free(d) {

@@ -1,6 +1,6 @@
 //! A split and its undoing on the faces shown, with what stands in pages.
 
-use super::page::{APPLIED, RowRef};
+use super::page::{APPLIED, LED, Page, RowRef};
 use super::{PagedError, PagedView};
 use crate::aif::NONE;
 use crate::format::ByteRanges;
@@ -52,10 +52,8 @@ impl<S: ByteRanges> PagedView<S> {
         if self.shelf.node(s.vertex) != parent {
             return Err(Damage::Fan(at).into());
         }
-        let needs = self.shelf.needs(i).ok_or(Damage::Fan(at))?;
-        let full = |d: u32| self.shelf.page(d).is_none_or(|(p, k)| p.dependents[k] > u8::MAX - 3);
-        if needs.into_iter().any(|d| d != NONE && full(d)) {
-            return Err(Damage::Fan(at).into());
+        if self.motions.is_some() {
+            self.can_count(i, |p| &p.holders)?;
         }
         let right = if s.code.two_faces() { self.cut(i, right)? } else { NONE };
         let cuts = (self.cut(i, left)?, right);
@@ -66,15 +64,61 @@ impl<S: ByteRanges> PagedView<S> {
         self.vertices += 1;
         self.applied += 1;
         if let Some((p, k)) = self.shelf.page_mut(i) {
-            p.flags[k] |= APPLIED;
-            p.applied += 1;
+            p.set(k, APPLIED, true);
         }
-        for d in needs.into_iter().filter(|&d| d != NONE) {
-            if let Some((p, k)) = self.shelf.page_mut(d) {
-                p.dependents[k] += 1;
-            }
+        if self.motions.is_some() {
+            self.pending -= usize::from(self.shelf.is_led(i));
+            self.count(i, |p| &mut p.holders, 1);
         }
         Ok(())
+    }
+
+    /// What split `i` depends on can have one more that depends on it. Honest meshes have few: what a hostile file says of more is damage.
+    pub(super) fn can_count(&self, i: u32, of: impl Fn(&Page) -> &Vec<u8>) -> Result<[u32; 3], Damage> {
+        let needs = self.shelf.needs(i).ok_or(Damage::Fan(i as usize))?;
+        let full = |d: u32| self.shelf.page(d).is_none_or(|(p, k)| of(p)[k] > u8::MAX - 3);
+        match needs.into_iter().any(|d| d != NONE && full(d)) {
+            true => Err(Damage::Fan(i as usize)),
+            false => Ok(needs),
+        }
+    }
+
+    /// Adds `by` to what is counted of all that split `i` depends on.
+    fn count(&mut self, i: u32, of: impl Fn(&mut Page) -> &mut Vec<u8>, by: i8) {
+        for d in self.shelf.needs(i).into_iter().flatten().filter(|&d| d != NONE) {
+            if let Some((p, k)) = self.shelf.page_mut(d) {
+                let n = &mut of(p)[k];
+                *n = n.wrapping_add_signed(by);
+            }
+        }
+    }
+
+    /// Split `i` is asked for now, or no longer. What it depends on can have one more.
+    pub(super) fn lead(&mut self, i: u32, on: bool) {
+        let (clock, timed) = (self.shelf.clock, self.motions.is_some());
+        let mut drawn = true;
+        let mut faces = 0;
+        if let Some((p, k)) = self.shelf.page_mut(i) {
+            p.set(k, LED, on);
+            p.turned |= timed;
+            drawn = p.flags[k] & APPLIED != 0;
+            faces = 1 + p.code[k].two_faces() as usize;
+            if !on {
+                p.stamp = clock;
+            }
+        }
+        self.count(i, |p| &mut p.dependents, if on { 1 } else { -1 });
+        let pending = usize::from(timed && !drawn);
+        if on {
+            self.led += 1;
+            self.led_faces += faces;
+            self.pending += pending;
+        } else {
+            self.led -= 1;
+            self.led_faces -= faces;
+            self.pending -= pending;
+        }
+        self.ahead += usize::from(timed && !self.at_once);
     }
 
     /// Undoes split `i`, which is applied and on which nothing applied depends. O(valence).
@@ -88,21 +132,17 @@ impl<S: ByteRanges> PagedView<S> {
             return Err(Damage::Fan(i as usize).into());
         }
         unsplit(self, &s, [fl, fr], &explicit);
-        let needs = self.shelf.needs(i).unwrap_or([NONE; 3]);
         let clock = self.shelf.clock;
         self.shelf.set_node(s.vertex, parent);
         self.shelf.set_node(s.new_vertex, NONE);
         self.vertices -= 1;
         self.applied -= 1;
         if let Some((p, k)) = self.shelf.page_mut(i) {
-            p.flags[k] &= !APPLIED;
-            p.applied -= 1;
+            p.set(k, APPLIED, false);
             p.stamp = clock;
         }
-        for d in needs.into_iter().filter(|&d| d != NONE) {
-            if let Some((p, k)) = self.shelf.page_mut(d) {
-                p.dependents[k] -= 1;
-            }
+        if self.motions.is_some() {
+            self.count(i, |p| &mut p.holders, -1);
         }
         Ok(())
     }

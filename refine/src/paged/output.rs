@@ -69,6 +69,11 @@ impl<S: ByteRanges> PagedView<S> {
     /// The mesh as flat arrays: vertices, faces and wedges that are shown, numbered in the order of the file. Takes memory of its own beside the limit. O(shown, and resident
     /// pages).
     pub fn to_input(&self) -> MeshInput {
+        self.to_input_with(&[])
+    }
+
+    /// [`PagedView::to_input`] with some vertices elsewhere: `places` by vertex, ascending, rounded to the stored precision.
+    pub fn to_input_with(&self, places: &[(u32, DVec3)]) -> MeshInput {
         let base = &self.shelf.base.mesh;
         let mut out = MeshInput {
             positions: match &base.base_positions {
@@ -78,10 +83,13 @@ impl<S: ByteRanges> PagedView<S> {
             ..Default::default()
         };
         let mut number: FxHashMap<u32, u32> = FxHashMap::default();
+        let mut next = places.iter().peekable();
         for v in self.vertices() {
-            let at = self.position(v).unwrap_or_default();
+            while next.next_if(|p| p.0 < v).is_some() {}
+            let elsewhere = next.next_if(|p| p.0 == v).map(|p| p.1);
+            let at = elsewhere.or_else(|| self.position(v)).unwrap_or_default();
             match &mut out.positions {
-                // They are stored so: nothing is rounded.
+                // They are stored so: but for those elsewhere nothing is rounded.
                 Positions::F32(p) => p.push(at.as_vec3().to_array()),
                 Positions::F64(p) => p.push(at.to_array()),
             }

@@ -64,10 +64,14 @@ impl Base {
     }
 }
 
-/// A split is applied.
+/// A split is applied to what is drawn.
 pub(super) const APPLIED: u8 = 1;
 /// It is in the closure that is being gathered.
 pub(super) const MARKED: u8 = 2;
+/// It is asked for: needed, or one that is depends on it. With geomorphs by time others may be applied too.
+pub(super) const LED: u8 = 4;
+/// After the last step of a geomorph by time it was applied and not asked for.
+pub(super) const LINGERED: u8 = 8;
 
 /// A chunk of splits, with what is applied of it.
 #[derive(Debug)]
@@ -95,8 +99,10 @@ pub(super) struct Page {
     pub(super) group: Vec<u32>,
     // What is applied.
     pub(super) flags: Vec<u8>,
-    /// Applied splits that depend on each.
+    /// Splits asked for that depend on each.
     pub(super) dependents: Vec<u8>,
+    /// With geomorphs by time: applied splits that do.
+    pub(super) holders: Vec<u8>,
     pub(super) last_place: Vec<u32>,
     pub(super) open_place: Vec<[u32; 2]>,
     /// The node that each vertex made here is at; [`NONE`] if it is not in the mesh.
@@ -107,8 +113,12 @@ pub(super) struct Page {
     pub(super) wedge_row: Vec<RowRef>,
     /// Of a row that changes a wedge, the one before.
     pub(super) row_before: Vec<RowRef>,
-    /// Applied splits: as long as there are any, the page stays.
-    pub(super) applied: usize,
+    /// Splits that are applied or asked for: as long as there are any, the page stays.
+    pub(super) in_use: usize,
+    /// Since the last step of a geomorph by time some have begun or ceased to be asked for.
+    pub(super) turned: bool,
+    /// Splits that lingered after it.
+    pub(super) lingered: usize,
     /// When it was used last.
     pub(super) stamp: u64,
 }
@@ -185,6 +195,7 @@ impl Page {
             group: shrink(block.face_group),
             flags: vec![0; count],
             dependents: vec![0; count],
+            holders: vec![0; count],
             last_place: vec![NONE; count],
             open_place: vec![[NONE; 2]; count],
             node: vec![NONE; count],
@@ -192,9 +203,21 @@ impl Page {
             wedge_vertex: vec![NONE; wedges],
             wedge_row: vec![RowRef::NOTHING; wedges],
             row_before: vec![RowRef::NOTHING; rows],
-            applied: 0,
+            in_use: 0,
+            turned: false,
+            lingered: 0,
             stamp: 0,
         })
+    }
+
+    /// Sets or clears flags of split `k` of the page.
+    #[inline]
+    pub(super) fn set(&mut self, k: usize, flags: u8, on: bool) {
+        let was = self.flags[k];
+        let is = if on { was | flags } else { was & !flags };
+        self.flags[k] = is;
+        let used = |f: u8| (f & (APPLIED | LED) != 0) as usize;
+        self.in_use = self.in_use + used(is) - used(was);
     }
 
     /// Where split `k` of the page puts the vertex that it splits, if it moves it.
@@ -236,6 +259,7 @@ impl Page {
             + of(&self.group)
             + of(&self.flags)
             + of(&self.dependents)
+            + of(&self.holders)
             + of(&self.last_place)
             + of(&self.open_place)
             + of(&self.node)
@@ -252,7 +276,7 @@ impl Page {
         let links = page_raw + size_of::<Packed>() as u64 * count;
         // Rows are at least 8 bytes of `raw` each, and need as many for what they were before.
         let attributes = 12 * count * (wedges > 0) as u64 + 12 * wedges + raw.saturating_sub(30 * count);
-        let state = (1 + 1 + 4 + 8 + 4) * count + 4 * faces + count.div_ceil(64) * 4;
+        let state = (1 + 1 + 1 + 4 + 8 + 4) * count + 4 * faces + count.div_ceil(64) * 4;
         usize::try_from(raw + links + attributes + state).unwrap_or(usize::MAX / 4) + size_of::<Page>() + 64
     }
 }

@@ -1,7 +1,7 @@
 //! Which pages are there; fetching, and letting go.
 
 use super::PagedError;
-use super::page::{APPLIED, Base, MARKED, Page, RowRef};
+use super::page::{APPLIED, Base, LED, MARKED, Page, RowRef};
 use crate::aif::NONE;
 use crate::format::{
     ByteRanges, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, pages, read_piece,
@@ -57,7 +57,7 @@ pub(super) struct Shelf<S> {
     /// Counts closures: pages used in the present one stay.
     pub(super) clock: u64,
     /// A split may move its vertex.
-    moves: bool,
+    pub(super) moves: bool,
     scratch: usize,
     pub(super) traffic: Traffic,
 }
@@ -234,6 +234,22 @@ impl<S: ByteRanges> Shelf<S> {
         (k < page.vertex.len()).then_some((page, k))
     }
 
+    /// Chunks of splits.
+    pub(super) fn chunk_count(&self) -> usize {
+        self.chunks.len()
+    }
+
+    /// The first split of a chunk, and how many it has if its page is there; else none.
+    pub(super) fn resident_run(&self, chunk: usize) -> (u32, u32) {
+        let page = self.pages.get(chunk).and_then(|p| p.as_deref());
+        page.map_or((0, 0), |p| (p.first, p.vertex.len() as u32))
+    }
+
+    /// The flags of split `i`; none if its page is not there.
+    pub(super) fn flags(&self, i: u32) -> u8 {
+        self.page(i).map_or(0, |(p, k)| p.flags[k])
+    }
+
     /// What it takes to have the page of split `i`. Notes that it is in use.
     pub(super) fn ask(&mut self, i: u32) -> Fetch {
         let (c, clock) = (self.chunk_of(i), self.clock);
@@ -293,10 +309,10 @@ impl<S: ByteRanges> Shelf<S> {
         Ok(())
     }
 
-    /// Drops the page that was used longest ago and of which nothing is applied; false if there is none.
+    /// Drops the page that was used longest ago and of which nothing is in use; false if there is none.
     pub(super) fn evict_one(&mut self) -> bool {
         let clock = self.clock;
-        let idle = |p: &&(usize, &Page)| p.1.applied == 0 && p.1.stamp < clock;
+        let idle = |p: &&(usize, &Page)| p.1.in_use == 0 && p.1.stamp < clock;
         let there = self.pages.iter().enumerate().filter_map(|(k, p)| Some((k, p.as_deref()?)));
         let oldest = there.filter(|p| idle(&p)).min_by_key(|(k, p)| (p.stamp, *k)).map(|o| o.0);
         let Some(page) = oldest.and_then(|k| self.pages[k].take()) else { return false };
@@ -307,13 +323,23 @@ impl<S: ByteRanges> Shelf<S> {
     }
 
     /// Resident pages, ascending.
-    pub(super) fn all(&self) -> impl Iterator<Item = &Page> {
+    pub(super) fn all(&self) -> impl DoubleEndedIterator<Item = &Page> {
         self.pages.iter().filter_map(|p| p.as_deref())
+    }
+
+    pub(super) fn all_mut(&mut self) -> impl Iterator<Item = &mut Page> {
+        self.pages.iter_mut().filter_map(|p| p.as_deref_mut())
     }
 
     #[inline]
     pub(super) fn is_applied(&self, i: u32) -> bool {
         self.page(i).is_some_and(|(p, k)| p.flags[k] & APPLIED != 0)
+    }
+
+    /// Split `i` is asked for.
+    #[inline]
+    pub(super) fn is_led(&self, i: u32) -> bool {
+        self.page(i).is_some_and(|(p, k)| p.flags[k] & LED != 0)
     }
 
     /// Marks split `i` as gathered, or not, if its page is there.

@@ -253,6 +253,11 @@ impl Lens {
         size / (self.depth(centre, radius, f64::INFINITY) * self.tau)
     }
 
+    /// The split may be seen.
+    pub(super) fn sees_entry(&self, e: &Entry) -> bool {
+        self.sees(e, e.centre.as_dvec3(), e.radius as f64)
+    }
+
     /// It may be seen.
     #[inline]
     pub(super) fn sees(&self, e: &Entry, centre: DVec3, radius: f64) -> bool {

@@ -1,10 +1,11 @@
 //! Geomorphs by time: a view that follows another, its vertices moving for a number of frames (Hoppe 1997).
 
+use super::cut::Cut;
 use super::entry::Entry;
-use super::{Lens, View};
-use crate::aif::NONE;
+use super::motions::{Motions, Stage};
+use super::{Followed, Lens, View};
 use glam::DVec3;
-use std::collections::BTreeMap;
+use std::convert::Infallible;
 
 /// What is drawn while a view (the *leader*) changes: every vertex moves to its new place in equal steps over a number of frames.
 ///
@@ -13,35 +14,13 @@ use std::collections::BTreeMap;
 /// the leader came to rest, what is drawn is the leader's mesh, with its vertices in its places bit for bit. Positions move, attributes do not.
 ///
 /// Guaranteed: what is drawn is a mesh without cracks in every frame, with at least the leader's faces. Not guaranteed: a tolerance while vertices
-/// move. Memory: a second view, and 90 B for every vertex that moves.
+/// move. Memory: a second view, and 70 to 140 B for every vertex that moves.
 #[derive(Clone, Debug)]
 pub struct TimedMorph {
     drawn: View,
-    frames: u32,
-    /// Vertices that are not in their own place in `drawn`, or may not be.
-    motions: BTreeMap<u32, Motion>,
+    motions: Motions,
     /// The leader's splits when it was followed last.
     led: Vec<u64>,
-}
-
-/// On the way, or there when `step` is the number of frames.
-#[derive(Clone, Copy, Debug)]
-struct Motion {
-    from: DVec3,
-    to: DVec3,
-    at: DVec3,
-    step: u32,
-}
-
-/// What [`TimedMorph::follow`] did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Followed {
-    /// Splits applied to what is drawn.
-    pub splits: usize,
-    /// Splits undone.
-    pub collapses: usize,
-    /// Vertices that are not where they will be.
-    pub morphing: usize,
 }
 
 /// The set bits, ascending.
@@ -59,17 +38,13 @@ fn bits(words: impl Iterator<Item = u64>) -> Vec<u32> {
 impl TimedMorph {
     /// Draws `leader` as it is. Later changes take `frames` frames, at least 1.
     pub fn new(leader: &View, frames: u32) -> TimedMorph {
-        TimedMorph {
-            drawn: leader.clone(),
-            frames: frames.max(1),
-            motions: BTreeMap::new(),
-            led: leader.front.applied_bits().collect(),
-        }
+        let led = leader.front.applied_bits().collect();
+        TimedMorph { drawn: leader.clone(), motions: Motions::new(frames), led }
     }
 
     /// Frames that a change takes.
     pub fn frames(&self) -> u32 {
-        self.frames
+        self.motions.frames()
     }
 
     /// The mesh that is drawn: its faces and, but for vertices that are elsewhere, its places.
@@ -84,105 +59,91 @@ impl TimedMorph {
 
     /// Where vertex `v` is drawn; `None` if it is not. Panics if there is no such vertex.
     pub fn position(&self, v: u32) -> Option<DVec3> {
-        self.motions.get(&v).map(|m| m.at).or_else(|| self.drawn.position(v))
+        self.motions.place(v).or_else(|| self.drawn.position(v))
     }
 
     /// The vertices that are drawn elsewhere than the mesh has them, ascending, and where.
-    pub fn displaced(&self) -> impl Iterator<Item = (u32, DVec3)> + '_ {
-        self.motions.iter().map(|(&v, m)| (v, m.at))
+    pub fn displaced(&self) -> impl ExactSizeIterator<Item = (u32, DVec3)> + '_ {
+        self.motions.all()
     }
 
     /// Takes a step towards `leader`, which must be a view of the same hierarchy and has been adapted to `lenses`. O(splits / 64 + changes + vertices that move).
     pub fn follow(&mut self, leader: &View, lenses: &[Lens]) -> Followed {
-        let mut done = Followed::default();
         let now: Vec<u64> = leader.front.applied_bits().collect();
-        // Closed sets: ascending, all that a split needs comes before it.
-        for i in bits(now.iter().zip(self.drawn.front.applied_bits()).map(|(a, b)| a & !b)) {
-            let [vs, vu] = self.ends(i);
-            let at = self.position(vs).unwrap_or_default();
-            self.drawn.apply(i);
-            let rest = Motion { from: at, to: at, at, step: self.frames };
-            self.motions.extend([(vs, rest), (vu, rest)]);
-            done.splits += 1;
-        }
-        let changed = bits(now.iter().zip(&self.led).map(|(a, b)| a ^ b));
-        self.led.copy_from_slice(&now);
-        for (v, seen) in self.below(&changed, lenses) {
-            self.send(v, seen, leader);
-        }
-        let frames = self.frames;
-        for m in self.motions.values_mut().filter(|m| m.step < frames) {
-            m.step += 1;
-            m.at = if m.step == frames {
-                m.to
-            } else {
-                m.from.lerp(m.to, f64::from(m.step) / f64::from(frames))
-            };
-        }
-        let leaving = bits(now.iter().zip(self.drawn.front.applied_bits()).map(|(a, b)| b & !a));
-        for &i in leaving.iter().rev() {
-            let ends = self.ends(i);
-            let there = |v: &u32| self.motions.get(v).is_none_or(|m| m.step == frames);
-            if self.drawn.is_free(i) && ends.iter().all(there) {
-                self.drawn.undo(i);
-                self.motions.remove(&ends[1]);
-                done.collapses += 1;
-            }
-        }
-        // At rest, and no more of it to be undone: in its own place.
-        let forest = &leader.hierarchy.forest;
-        let own = |v: u32| self.drawn.front.node(forest, v) == leader.front.node(forest, v);
-        self.motions.retain(|&v, m| m.step < frames || !own(v));
-        done.morphing = self.motions.values().filter(|m| m.step < frames).count();
+        let before = std::mem::replace(&mut self.led, now);
+        let mut both = Both { drawn: &mut self.drawn, led: &self.led, before: &before };
+        let Ok(done) = self.motions.follow(&mut both, lenses);
         done
     }
+}
 
-    /// The old vertex of split `i`, and the new one.
-    fn ends(&self, i: u32) -> [u32; 2] {
-        let h = &self.drawn.hierarchy;
-        [h.mesh().splits.vertex[i as usize], h.forest.base_vertices + i]
+/// What is drawn, and what was and is asked for, a bit a split.
+struct Both<'a> {
+    drawn: &'a mut View,
+    led: &'a [u64],
+    before: &'a [u64],
+}
+
+impl Cut for Both<'_> {
+    fn is_applied(&self, i: u32) -> bool {
+        Cut::is_applied(self.drawn, i)
     }
 
-    /// The vertices drawn in the regions of these splits, and whether a lens sees one that is about them.
-    fn below(&self, splits: &[u32], lenses: &[Lens]) -> BTreeMap<u32, bool> {
-        let h = &self.drawn.hierarchy;
-        let mut out = BTreeMap::new();
-        let mut stack = Vec::new();
-        for &i in splits {
-            let e = Entry::of(h, i);
-            let seen = lenses.iter().any(|l| l.sees(&e, e.centre.as_dvec3(), e.radius as f64));
-            // Vertices, and the splits that may come next at them.
-            stack.push((self.ends(i)[0], i));
-            while let Some((v, next)) = stack.pop() {
-                if next != NONE && self.drawn.front.is_applied(next) {
-                    let [old, new] = h.forest.below(h.mesh(), next);
-                    stack.extend([(v, old), (self.ends(next)[1], new)]);
-                } else {
-                    *out.entry(v).or_insert(false) |= seen;
-                }
-            }
-        }
-        out
+    fn node(&self, v: u32) -> u32 {
+        self.drawn.node(v)
     }
 
-    /// Sends vertex `v` to where its ancestor stands in `leader`; at once if that is not seen.
-    fn send(&mut self, v: u32, seen: bool, leader: &View) {
-        let h = self.drawn.hierarchy.clone();
-        let Some(at) = self.position(v) else { return };
-        let (mut node, mut vertex) = (self.drawn.front.node(&h.forest, v), v);
-        while leader.front.node(&h.forest, vertex) != node {
-            let i = h.forest.maker(node);
-            if i == NONE {
-                break;
-            }
-            (node, vertex) = (h.forest.parent(h.mesh(), i), h.mesh().splits.vertex[i as usize]);
-        }
-        let to = h.forest.position(h.mesh(), node, vertex);
-        let m = self.motions.entry(v).or_insert(Motion { from: at, to: at, at, step: self.frames });
-        if !seen || at == to {
-            *m = Motion { from: to, to, at: to, step: self.frames };
-        } else if m.to != to {
-            *m = Motion { from: at, to, at, step: 0 };
-        }
+    fn maker(&self, node: u32) -> u32 {
+        self.drawn.maker(node)
+    }
+
+    fn parent(&self, i: u32) -> (u32, u32) {
+        self.drawn.parent(i)
+    }
+
+    fn new_vertex(&self, i: u32) -> u32 {
+        self.drawn.new_vertex(i)
+    }
+
+    fn below(&self, i: u32) -> [u32; 2] {
+        Cut::below(self.drawn, i)
+    }
+
+    fn entry(&self, i: u32) -> Entry {
+        self.drawn.entry(i)
+    }
+
+    fn place(&self, node: u32, v: u32) -> DVec3 {
+        self.drawn.place(node, v)
+    }
+}
+
+impl Stage for Both<'_> {
+    type Error = Infallible;
+
+    fn is_led(&self, i: u32) -> bool {
+        self.led[i as usize / 64] >> (i % 64) & 1 != 0
+    }
+
+    fn changed(&self) -> Vec<u32> {
+        bits(self.led.iter().zip(self.before).map(|(a, b)| a ^ b))
+    }
+
+    fn lingering(&self) -> Vec<u32> {
+        bits(self.led.iter().zip(self.drawn.front.applied_bits()).map(|(a, b)| b & !a))
+    }
+
+    fn is_free(&self, i: u32) -> bool {
+        self.drawn.is_free(i)
+    }
+
+    fn draw(&mut self, i: u32) -> Result<(), Infallible> {
+        self.drawn.apply(i);
+        Ok(())
+    }
+
+    fn undraw(&mut self, i: u32) -> Result<(), Infallible> {
+        self.drawn.undo(i);
+        Ok(())
     }
 }

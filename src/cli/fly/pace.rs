@@ -81,6 +81,11 @@ impl<'a> Pace<'a> {
 }
 
 impl<T> Timed<T> {
+    /// The same with a part of what was done.
+    pub(super) fn of<U>(&self, done: U) -> Timed<U> {
+        Timed { tau: self.tau, us: self.us, done }
+    }
+
     /// What a report says of it; what is shown, and what changed, is to be filled in.
     pub(super) fn frame(&self, done: &Done) -> Frame {
         Frame {

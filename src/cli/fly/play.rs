@@ -2,9 +2,10 @@
 
 use super::super::common::{self, short};
 use super::super::{Failure, args};
-use super::flight::Step;
+use super::pace::Timed;
+use progmesh::refine::selective::Done;
 use progmesh::refine::view::Camera;
-use progmesh::selective::{FrameCounts, RecordError, Recorder, SelectiveScene, player_page};
+use progmesh::selective::{FrameCounts, RecordError, Recordable, Recorder, player_page};
 use std::path::PathBuf;
 
 /// A page that plays the flight.
@@ -38,12 +39,12 @@ fn multiple(text: &str) -> Result<f64, String> {
 const PAGE: usize = 64 << 10;
 
 impl PlayArgs {
-    /// Fails where the page could not be written.
     /// A flag that was given, if any was.
     pub(super) fn given(&self) -> Option<&'static str> {
         self.html.as_ref().map(|_| "--html")
     }
 
+    /// Fails where the page could not be written.
     pub(super) fn check(&self) -> Result<(), Failure> {
         self.html.as_deref().map_or(Ok(()), common::check_target)
     }
@@ -57,7 +58,7 @@ impl PlayArgs {
         all
     }
 
-    pub(super) fn start(&self, scene: &SelectiveScene, path: &[Camera], name: &str) -> Option<Playing<'_>> {
+    pub(super) fn start<R: Recordable>(&self, scene: &R, path: &[Camera], name: &str) -> Option<Playing<'_>> {
         self.html.as_ref()?;
         let stride = path.len().div_ceil(self.html_frames).max(1);
         // Base64 takes four bytes for three.
@@ -81,18 +82,24 @@ impl Playing<'_> {
         self.recorder.begin(tau, asked).map_err(|e| self.failed(&e))
     }
 
-    pub(super) fn take(&mut self, step: &Step<'_>) -> Result<(), Failure> {
-        let (done, tau) = (step.timed.done, step.timed.tau);
+    /// Frame `number`, once it has been refined.
+    pub(super) fn take<R: Recordable>(
+        &mut self,
+        number: usize,
+        (scene, changes): (&R, &[R::Changes]),
+        timed: &Timed<Done>,
+    ) -> Result<(), Failure> {
+        let Timed { done, tau, .. } = *timed;
         let counts = FrameCounts { splits: done.splits, collapses: done.collapses, tau };
-        self.recorder.note(step.scene, step.changes);
-        if !step.number.is_multiple_of(self.stride) {
+        self.recorder.note(scene, changes);
+        if !number.is_multiple_of(self.stride) {
             self.recorder.skip(&counts);
             return Ok(());
         }
-        self.recorder.frame(step.scene, &counts).map_err(|e| self.failed(&e))
+        self.recorder.frame(scene, &counts).map_err(|e| self.failed(&e))
     }
 
-    pub(super) fn write(self, scene: &SelectiveScene) -> Result<(), Failure> {
+    pub(super) fn write<R: Recordable>(self, scene: &R) -> Result<(), Failure> {
         let Some(path) = &self.arguments.html else { return Ok(()) };
         let (stride, frames) = (self.stride, self.frames);
         let failed = |e: &RecordError| failure(self.arguments, e, stride, frames);

@@ -1,0 +1,222 @@
+//! Geomorphs of a paged view, by the same steps and with the same places as those in memory.
+//!
+//! By time, what is asked for and what is drawn are two cuts in the same pages: [`PagedView::adapt`] changes the first, a step applies and undoes splits of the second. What lingers keeps its pages.
+
+use super::PagedView;
+use super::page::{APPLIED, LED, LINGERED, Page};
+use super::{PagedError, shelf::Shelf};
+use crate::aif::NONE;
+use crate::format::ByteRanges;
+use crate::selective::{Cut, Entry, Followed, Lens, Motions, Stage, morphed};
+use glam::DVec3;
+
+/// Bytes that a vertex on the way takes: at most 142 in the tree of motions, whose leaves of 680 B (and what the allocator adds) hold 5 of 11 at least; 32 in a caller's list of places.
+pub(super) const MOTION: usize = 176;
+/// Bytes that a change takes until the step is done: two motions, and in lists that double its number and the vertices below it (which hold no others: all below it linger, or are new).
+pub(super) const CHANGE: usize = 2 * (MOTION + 72) + 16;
+
+impl<S: ByteRanges> PagedView<S> {
+    /// From the next frame on changes show themselves over so many frames, as those of [`crate::selective::TimedMorph`] do; `None`: at once, and what is still on the way is
+    /// there at once.
+    ///
+    /// Then [`PagedView::adapt`] only finds what is asked for; [`PagedView::follow`], called after it, changes what is drawn. What is undone stays until its vertices have moved, and
+    /// so does its memory; each vertex on the way takes 176 B more. Where there is no room for that within the limit, the changes of a frame are made at once; so no mesh is coarser for it.
+    ///
+    /// Errors: as [`PagedView::follow`].
+    pub fn set_timed(&mut self, frames: Option<u32>) -> Result<(), PagedError> {
+        if self.motions.is_some() {
+            self.settle()?;
+        }
+        let begins = self.motions.is_none() && frames.is_some();
+        self.motions = frames.map(Motions::new);
+        if begins {
+            // What is drawn is what is asked for.
+            self.shelf.all_mut().for_each(|p| p.holders.copy_from_slice(&p.dependents));
+        }
+        Ok(())
+    }
+
+    /// With geomorphs by time: a step of what is drawn towards what was asked for last, with the lenses that asked. O(chunks of the file + changes + vertices that move).
+    ///
+    /// Errors: damage. The mesh that is drawn is sound then, and closed, somewhere on the way.
+    pub fn follow(&mut self, lenses: &[Lens]) -> Result<Followed, PagedError> {
+        let Some(motions) = &mut self.motions else { return Ok(Followed::default()) };
+        let before = std::mem::take(&mut self.jumped);
+        if self.at_once {
+            return Ok(before + self.settle()?);
+        }
+        let nothing = Motions::new(motions.frames());
+        let mut motions = std::mem::replace(motions, nothing);
+        let result = motions.follow(self, lenses);
+        self.motions = Some(motions);
+        let done = result?;
+        self.stepped();
+        Ok(before + done)
+    }
+
+    /// Settles, and says whether that gave anything back.
+    pub(super) fn make_way(&mut self) -> Result<bool, PagedError> {
+        if self.motions.is_none() {
+            return Ok(false);
+        }
+        let before = self.bytes();
+        let done = self.settle()?;
+        self.jumped = self.jumped + done;
+        Ok(done.collapses > 0 || self.bytes() < before)
+    }
+
+    /// What is still on the way is where it will be, and what lingers goes.
+    ///
+    /// Errors: as [`PagedView::follow`].
+    pub fn settle(&mut self) -> Result<Followed, PagedError> {
+        let mut done = Followed::default();
+        let Some(motions) = &mut self.motions else { return Ok(done) };
+        motions.clear();
+        // Page by page: without lists.
+        for c in 0..self.shelf.chunk_count() {
+            let (first, count) = self.shelf.resident_run(c);
+            for i in first..first + count {
+                if self.shelf.flags(i) & (APPLIED | LED) == LED {
+                    self.split_faces(i)?;
+                    done.splits += 1;
+                }
+            }
+        }
+        for c in (0..self.shelf.chunk_count()).rev() {
+            let (first, count) = self.shelf.resident_run(c);
+            for i in (first..first + count).rev() {
+                if self.shelf.flags(i) & (APPLIED | LED) == APPLIED {
+                    self.unsplit_faces(i)?;
+                    done.collapses += 1;
+                }
+            }
+        }
+        self.stepped();
+        Ok(done)
+    }
+
+    /// The next step is made at once: that takes no room.
+    pub(super) fn jump(&mut self) {
+        (self.ahead, self.at_once) = (0, true);
+    }
+
+    /// Remembers what lingers.
+    fn stepped(&mut self) {
+        for p in self.shelf.all_mut().filter(|p| p.turned || p.lingered > 0) {
+            p.lingered = 0;
+            for f in &mut p.flags {
+                let lingers = *f & (APPLIED | LED) == APPLIED;
+                *f = if lingers { *f | LINGERED } else { *f & !LINGERED };
+                p.lingered += usize::from(lingers);
+            }
+            p.turned = false;
+        }
+        (self.ahead, self.at_once) = (0, false);
+    }
+
+    /// The vertices that are drawn elsewhere than [`PagedView::position`] says, ascending, and where; by time.
+    pub fn displaced(&self) -> impl ExactSizeIterator<Item = (u32, DVec3)> + '_ {
+        static NOTHING: Motions = Motions::NOTHING;
+        self.motions.as_ref().unwrap_or(&NOTHING).all()
+    }
+
+    /// Where vertex `v` is drawn if splits are to show themselves by their errors: as [`crate::selective::View::morphed_by_all`].
+    pub fn morphed_by_all(&self, lenses: &[Lens], v: u32, band: f64) -> Option<DVec3> {
+        ((v as usize) < self.full_vertices()).then(|| morphed(self, lenses, v, band)).flatten()
+    }
+
+    /// Sets aside so many bytes of the limit for every vertex shown, for what the caller holds of each.
+    pub fn set_beside(&mut self, bytes: usize) {
+        self.beside = bytes;
+    }
+}
+
+impl<S> Shelf<S> {
+    /// The splits of resident pages of which `of` is true, ascending. `pages`: of those only.
+    fn splits_where(&self, pages: impl Fn(&Page) -> bool, of: impl Fn(u8) -> bool) -> Vec<u32>
+    where
+        S: ByteRanges,
+    {
+        let mut out = Vec::new();
+        for p in self.all().filter(|p| pages(p)) {
+            out.extend((p.first..).zip(&p.flags).filter(|(_, f)| of(**f)).map(|(i, _)| i));
+        }
+        out
+    }
+}
+
+impl<S: ByteRanges> Cut for PagedView<S> {
+    fn is_applied(&self, i: u32) -> bool {
+        self.shelf.is_applied(i)
+    }
+
+    fn node(&self, v: u32) -> u32 {
+        self.shelf.node(v)
+    }
+
+    fn maker(&self, node: u32) -> u32 {
+        self.shelf.maker(node)
+    }
+
+    // Pages of what is applied or asked for are there, so nothing is missing below.
+
+    fn parent(&self, i: u32) -> (u32, u32) {
+        self.shelf.parent(i).unwrap_or((NONE, NONE))
+    }
+
+    fn new_vertex(&self, i: u32) -> u32 {
+        self.shelf.head.base_vertices + i
+    }
+
+    fn below(&self, i: u32) -> [u32; 2] {
+        let old = self.shelf.head.base_vertices + 2 * i;
+        // Chunks of a hostile file may both say that a split is theirs; it says itself whose it is.
+        let own = |node: u32| {
+            let (next, _) = self.shelf.continuation(node);
+            if self.shelf.parent(next).is_some_and(|p| p.0 == node) { next } else { NONE }
+        };
+        [own(old), own(old + 1)]
+    }
+
+    fn entry(&self, i: u32) -> Entry {
+        let bounds = self.shelf.page(i).map_or_else(Default::default, |(p, k)| p.own[k]);
+        let centre = self.shelf.local_centre(self.parent(i).0);
+        Entry::new(i, centre.unwrap_or_default(), bounds)
+    }
+
+    fn place(&self, node: u32, _: u32) -> DVec3 {
+        self.shelf.position(node).unwrap_or_default()
+    }
+}
+
+impl<S: ByteRanges> Stage for PagedView<S> {
+    type Error = PagedError;
+
+    fn is_led(&self, i: u32) -> bool {
+        self.shelf.is_led(i)
+    }
+
+    fn changed(&self) -> Vec<u32> {
+        let changed = |f: u8| {
+            matches!(f & (APPLIED | LED | LINGERED), LED | APPLIED)
+                || f & (APPLIED | LED | LINGERED) == (APPLIED | LED | LINGERED)
+        };
+        self.shelf.splits_where(|p| p.turned, changed)
+    }
+
+    fn lingering(&self) -> Vec<u32> {
+        self.shelf.splits_where(|p| p.turned || p.lingered > 0, |f| f & (APPLIED | LED) == APPLIED)
+    }
+
+    fn is_free(&self, i: u32) -> bool {
+        self.shelf.page(i).is_some_and(|(p, k)| p.flags[k] & APPLIED != 0 && p.holders[k] == 0)
+    }
+
+    fn draw(&mut self, i: u32) -> Result<(), PagedError> {
+        self.split_faces(i)
+    }
+
+    fn undraw(&mut self, i: u32) -> Result<(), PagedError> {
+        self.unsplit_faces(i)
+    }
+}
