@@ -91,6 +91,40 @@ impl ProgressiveScene {
         }
     }
 
+    /// Puts the splits of all meshes in order of their errors, in the world, level by level ([`ProgressiveMesh::sorted_by_error`]). To be done to what was read from a file before a
+    /// [`Detail`] between base and full detail is asked for: there splits come in chunks, of which some refine one part of a mesh and others another. A mesh that cannot be
+    /// sorted stays as it is. O(n log n).
+    pub fn sort_by_error(&mut self) {
+        for mesh in &mut self.meshes {
+            if let Some(sorted) = mesh.sorted_by_error() {
+                *mesh = sorted;
+            }
+        }
+        if self.meshes.len() < 2 {
+            return;
+        }
+        let scales = world_scales(&self.shell);
+        let mut all: Vec<(usize, f64, u32)> = Vec::with_capacity(self.turns.len());
+        for ((m, mesh), scale) in (0u32..).zip(&self.meshes).zip(scales) {
+            // The levels that are still to come: meshes with fewer were done earlier.
+            let ends = mesh.levels.iter().filter(|&&l| l > 0);
+            let (mut rest, mut start) = (ends.clone().count(), 0);
+            for &end in ends {
+                rest -= 1;
+                let errors = mesh.splits.error.get(start..end as usize).unwrap_or_default();
+                // What a mesh cannot be sorted by rises no more.
+                let mut least = f64::INFINITY;
+                all.extend(errors.iter().map(|&e| {
+                    least = least.min(scale * e as f64);
+                    (rest, least, m)
+                }));
+                start = end as usize;
+            }
+        }
+        all.sort_by(|a, b| b.0.cmp(&a.0).then(b.1.total_cmp(&a.1)));
+        self.turns = all.into_iter().map(|(_, _, m)| m).collect();
+    }
+
     fn at_triangles(&self, most: usize) -> Vec<usize> {
         let mut at = vec![0; self.meshes.len()];
         let mut have = self.base_triangles();

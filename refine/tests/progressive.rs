@@ -4,6 +4,7 @@ mod common;
 
 use common::{NAMES, assert_same, options, sample};
 use progmesh_refine::aif::*;
+use progmesh_refine::format::{EncodeOptions, decode, encode};
 use progmesh_refine::progressive::{Patch, build, build_all};
 use progmesh_refine::simplify::{Method, Options, Placement, Quiet, Schedule, simplify};
 use progmesh_refine::{Cursor, ProgressiveMesh};
@@ -347,4 +348,81 @@ fn where_seams_end_full_detail_is_the_input_all_the_same() {
             }
         }
     }
+}
+
+/// Errors fall from split to split, within each level.
+fn assert_falling(pm: &ProgressiveMesh) {
+    for level in pm.levels.windows(2) {
+        let errors = &pm.splits.error[level[0] as usize..level[1] as usize];
+        assert!(errors.is_sorted_by(|a, b| a >= b), "{errors:?}");
+    }
+}
+
+#[test]
+fn what_a_file_holds_can_be_sorted_by_error_again() {
+    for name in NAMES {
+        for o in [&runs()[0], &runs()[3]] {
+            let mesh = sample(name, 1500, 4);
+            let input = mesh.to_input();
+            let pm = build(mesh, o, &Quiet).unwrap().mesh;
+            // Many chunks and bands.
+            let how = EncodeOptions::default().with_chunk(Some(60));
+            let read = decode(&encode(std::slice::from_ref(&pm), &[], &[], &how).unwrap()).unwrap();
+            let read = &read.meshes[0];
+            let sorted = read.sorted_by_error().unwrap();
+            assert_falling(&sorted);
+            assert_eq!(sorted.levels, pm.levels);
+            let mut c = sorted.cursor().unwrap();
+            c.seek(usize::MAX).unwrap();
+            assert_same(&c.to_ordered_input(), &input);
+            // At levels it is the mesh that it was; between them as valid.
+            let mut was = read.cursor().unwrap();
+            for &level in &pm.levels {
+                c.seek(level as usize).unwrap();
+                was.seek(level as usize).unwrap();
+                assert_same(&c.to_ordered_input(), &was.to_ordered_input());
+                c.seek(level as usize / 2).unwrap();
+                assert_valid(&c);
+            }
+            if pm.levels.len() > 2 {
+                continue;
+            }
+            // An error asked for takes no more splits than are larger, but for half an octave, to which files round.
+            let mut built = pm.cursor().unwrap();
+            for k in [0.9, 0.6, 0.3, 0.05] {
+                let error = pm.splits.error[(pm.splits.len() as f64 * k) as usize] as f64;
+                let larger = pm.splits.error.iter().filter(|&&e| 1.5 * e as f64 >= error).count();
+                c.seek_error(error).unwrap();
+                assert!(c.position() <= larger, "{name}: {} of {larger}", c.position());
+                built.seek_error(error).unwrap();
+                let exact = pm.splits.error.iter().filter(|&&e| e as f64 > error).count();
+                assert!(c.position() >= exact, "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn splits_of_equal_errors_come_evenly_and_after_those_they_need() {
+    let mut pm = build(sample("scan", 3000, 3), &options(Method::Quadric, None), &Quiet).unwrap().mesh;
+    pm.splits.error.fill(1.0);
+    let order = pm.by_error();
+    assert!(pm.reordered(&order).is_ok());
+    // A half of them, whichever, is a half of each quarter.
+    let n = order.len();
+    let half = &order[..n / 2];
+    for quarter in 0..4 {
+        let range = n * quarter / 4..n * (quarter + 1) / 4;
+        let there = half.iter().filter(|&&i| range.contains(&(i as usize))).count();
+        // Those at the end need many of those before.
+        assert!((n / 20..n / 4).contains(&there), "quarter {quarter}: {there} of {}", n / 4);
+    }
+    // Errors that rise along dependencies, as in a damaged mesh, and what is no number.
+    for (i, e) in pm.splits.error.iter_mut().enumerate() {
+        *e = if i % 7 == 0 { f32::NAN } else { i as f32 };
+    }
+    assert!(pm.reordered(&pm.by_error()).is_ok());
+    // Damage is left alone.
+    pm.splits.vertex[5] = u32::MAX;
+    assert!(pm.sorted_by_error().is_none());
 }

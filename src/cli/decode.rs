@@ -53,7 +53,8 @@ pub(crate) struct DetailArgs {
     /// This part of the triangles of full detail, 0 to 1
     #[arg(long, value_name = "R", value_parser = args::fraction, allow_negative_numbers = true, help_heading = "Detail")]
     ratio: Option<f64>,
-    /// The coarsest mesh of which no split left out has a larger estimated error, world units
+    /// The coarsest mesh of which no split left out has a larger estimated error, world units; a file of ours keeps errors to
+    /// half an octave, rounded up, so that some splits more are made
     #[arg(long, value_name = "E", value_parser = args::not_negative, allow_negative_numbers = true,
           help_heading = "Detail")]
     max_error: Option<f64>,
@@ -85,10 +86,13 @@ impl Args {
         let file = self.input.name();
         let interrupt = Interrupt::watch();
         let (detail, report) = common::in_pool(self.threads, || {
-            let read = self.input.read(self.salvage, &mut warnings)?;
+            let mut read = self.input.read(self.salvage, &mut warnings)?;
             let reading = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
             let detail = self.detail.detail(&read);
+            if matches!(detail, Detail::Triangles(_) | Detail::MaxError(_)) {
+                read.sort_by_error();
+            }
             if let Some(k) = self.detail.level.filter(|&k| k >= read.levels()) {
                 let last = read.levels().saturating_sub(1);
                 warnings.say([format!("{file}: there is no level {k}: the finest is level {last}")]);

@@ -93,7 +93,7 @@ impl Args {
         let file = self.input.name();
         let interrupt = Interrupt::watch();
         let report = common::in_pool(self.making.collapsing.threads, || {
-            let read = self.input.read_or_make(&mut warnings, |scene, warnings| {
+            let mut read = self.input.read_or_make(&mut warnings, |scene, warnings| {
                 interrupt.be_graceful();
                 let progress = Progress::new(&interrupt, self.quiet, "simplifying");
                 let built = build_progressive(scene, &job, &progress)
@@ -105,6 +105,9 @@ impl Args {
                 Ok(built.scene)
             })?;
             interrupt.be_graceful();
+            if self.input.progressive_path().is_some() {
+                read.sort_by_error();
+            }
             let scenes = self.scenes(&read, &file, &interrupt, &mut warnings)?;
             if let Some(d) = &mut drawing {
                 // All levels side by side, from one camera.

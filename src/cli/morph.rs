@@ -48,8 +48,9 @@ impl Args {
         let format = output.format(&mut warnings)?;
         let file = self.input.name();
         let interrupt = Interrupt::watch();
-        let read = self.input.read(false, &mut warnings)?;
+        let mut read = self.input.read(false, &mut warnings)?;
         interrupt.be_graceful();
+        read.sort_by_error();
         let positions = |faces: usize| read.positions(Detail::Triangles(faces));
         let (from, to) = (positions(self.from), positions(self.to));
         let (scene, ends) = read

@@ -62,7 +62,8 @@ pub(crate) fn read_piece(chunk: &Chunk, head: Option<&MeshHead>, bytes: &[u8]) -
     }
 }
 
-/// Reads a whole file.
+/// Reads a whole file. Splits come in the order of the file: chunk after chunk, each of which refines a part of the mesh. Before states between the chunks are asked for,
+/// [`ProgressiveMesh::sorted_by_error`] puts them in that of their errors.
 ///
 /// Errors: damage of any kind; [`decode_prefix`] returns what came before it. O(n).
 pub fn decode(bytes: &[u8]) -> Result<Decoded, FormatError> {

@@ -42,6 +42,13 @@ impl InputOrder {
             + 16 * self.rows.len()
     }
 
+    /// The arrays are as long as those of `pm` ask for.
+    pub(super) fn fits(&self, pm: &ProgressiveMesh) -> bool {
+        self.vertex.len() == pm.vertices()
+            && self.face.len() == pm.faces()
+            && self.wedge.len() == if self.wedge.is_empty() { 0 } else { pm.wedge_slots() }
+    }
+
     /// Finds every polygon corner among the corners of the polygon's triangles.
     pub(super) fn note_polygons(&mut self, input: &MeshInput, triangles: &MeshInput, face_map: &[u32]) {
         let Some(sizes) = &input.face_sizes else { return };

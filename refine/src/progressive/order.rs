@@ -147,6 +147,56 @@ impl ProgressiveMesh {
         Ok(out)
     }
 
+    /// The splits by error, the largest first, level after level ([`ProgressiveMesh::levels`]); an order for [`ProgressiveMesh::reordered`]. Of splits of the
+    /// same error, of which files have many, those come early that are far from each other in the present order: so meshes between two errors are as
+    /// fine everywhere. O(n log n).
+    pub fn by_error(&self) -> Vec<u32> {
+        let n = self.splits.len();
+        // By level, error (floats of one sign compare as their bits), place among equals. A split that depends on one of a later key gets that.
+        let mut keys: Vec<(u32, u32, u32)> = Vec::with_capacity(n);
+        let mut levels = self.levels.iter().copied().peekable();
+        let mut level = 0;
+        for (i, (on, &error)) in (0u32..).zip(self.dependencies().iter().zip(&self.splits.error)) {
+            while levels.next_if(|&l| l <= i).is_some() {
+                level += 1;
+            }
+            let falling = if error > 0.0 { !error.to_bits() } else { u32::MAX };
+            let own = (level, falling, i.reverse_bits());
+            let before = on.iter().filter_map(|&d| keys.get(d as usize).copied());
+            let key = before.fold(own, |key, d| key.max(d));
+            keys.push(key);
+        }
+        let mut order: Vec<u32> = (0..n as u32).collect();
+        order.sort_unstable_by_key(|&i| (keys[i as usize], i));
+        order
+    }
+
+    /// The same mesh with its splits [`ProgressiveMesh::by_error`] and its levels kept: [`super::Cursor::seek_faces`] and
+    /// [`super::Cursor::seek_error`] find the best there is. For meshes that were read from files, where splits come in chunks. `None` where
+    /// splits name wedges at their tips outright, which only the order that is there does justice to, and of damaged meshes. O(n log n).
+    pub fn sorted_by_error(&self) -> Option<ProgressiveMesh> {
+        if self.names_tips() || self.order.as_ref().is_some_and(|o| !o.fits(self)) {
+            return None;
+        }
+        // Whatever the arrays say, it leads to full detail.
+        self.cursor().ok()?.seek(usize::MAX).ok()?;
+        let mut sorted = self.reordered(&self.by_error()).ok()?;
+        sorted.levels.clone_from(&self.levels);
+        Some(sorted)
+    }
+
+    /// Some split names the wedge at a tip.
+    fn names_tips(&self) -> bool {
+        let Some(streams) = &self.wedges else { return false };
+        self.rows_of_splits().into_iter().zip(&self.splits.code).any(|(r, code)| {
+            let entry = streams.explicit.get(r.explicit).unwrap_or_default();
+            let faces = 1 + code.two_faces() as usize;
+            let corners =
+                entry.len().checked_sub(3 * faces).and_then(|at| entry.get(at..)).unwrap_or_default();
+            corners.chunks_exact(3).any(|c| c[2] != NONE)
+        })
+    }
+
     fn moved_in_order(&self, order: &[u32]) -> Positions {
         let mut next = 0;
         let slots: Vec<u32> = self
