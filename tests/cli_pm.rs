@@ -454,3 +454,37 @@ fn levels_come_from_any_mesh_and_into_separate_files() {
     p.run("lod in.ply out.glb --levels 0.5,0.1 --coverage 0.5").failed(2, "1 numbers for 2 levels");
     p.run("lod in.ply out.glb --levels 0.5,0.1 --coverage 0.1,0.5").failed(2, "the largest comes first");
 }
+
+#[test]
+fn hoppes_files_are_meshes_for_every_command() {
+    let p = Place::new();
+    p.write("h.pm", include_bytes!("corpus/hoppe_pm/small.pm"));
+    let camera = r#"{"eye": [0, 0, 9], "target": [0, 0, 0], "up": [0, 1, 0], "fov_y_deg": 40, "width": 200, "height": 200, "near": 0.1, "far": 100}"#;
+    p.write("c.json", camera);
+    for run in [
+        "info h.pm --check",
+        "simplify h.pm s.obj --ratio 0.9",
+        "convert h.pm c.glb",
+        "compare h.pm h.pm",
+        "clip h.pm k.ply --plane 1,0,0,0",
+        "cull h.pm u.ply --camera c.json",
+        "levels h.pm --runs 1 --samples 0",
+        "encode h.pm e.pm",
+        "lod h.pm l.glb --levels 0.6,0.3",
+        "morph h.pm m.obj --from 10 --to 20 --at 0.5",
+        "decode h.pm d.obj --triangles 20",
+    ] {
+        p.done(run);
+    }
+    // Its splits only go in their own order: for a view new ones are made, and that is said.
+    for run in ["extract h.pm x.obj --camera c.json --tau 0 --cull none", "fly h.pm --path circle --frames 3"]
+    {
+        let run = p.done(run);
+        assert!(run.stderr.contains("new ones are used"), "{}", run.stderr);
+    }
+    let faces = |name: &str| p.text(name).lines().filter(|l| l.starts_with("f ")).count();
+    p.done("decode h.pm full.obj");
+    assert_eq!(faces("x.obj"), faces("full.obj"));
+    let run = p.run("fly h.pm --path circle --memory 16");
+    assert!(run.code == 3 && run.stderr.contains("Hoppe"), "{}", run.stderr);
+}

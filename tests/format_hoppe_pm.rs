@@ -560,6 +560,17 @@ fn damage_is_an_error_and_never_a_panic() {
     assert!(hoppe::decode(&lying).is_err());
 }
 
+/// A small file for the tests that need one on the disk, with splits that make wedges at their tips.
+#[test]
+#[ignore = "writes tests/corpus/hoppe_pm anew"]
+fn the_corpus_is_written_anew() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus/hoppe_pm");
+    std::fs::create_dir_all(&folder).unwrap();
+    let (bytes, _) = file(1, 24, true, true, true);
+    assert!(!decode_progressive(&bytes).unwrap().scene.meshes[0].is_reorderable());
+    std::fs::write(folder.join("small.pm"), bytes).unwrap();
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 

@@ -13,10 +13,11 @@ use super::rule::{Guard, RuleArgs};
 use super::{Failure, camera};
 use clap::ValueEnum;
 use progmesh::pipeline::build_progressive;
-use progmesh::progressive::ProgressiveScene;
-use progmesh::refine::Strips;
+use progmesh::progressive::{Detail, ProgressiveScene};
 use progmesh::refine::selective::Cull;
+use progmesh::refine::{ProgressiveMesh, Strips};
 use progmesh::report::View;
+use progmesh::scene::Scene;
 use progmesh::selective::SelectiveScene;
 use progmesh::simplify::Stop;
 use serde::Serialize;
@@ -127,7 +128,7 @@ pub(crate) fn make(
     let job = making.job()?;
     let file = input.name();
     let failed = |e: &dyn std::fmt::Display| Failure::Input(format!("{file}: {e}"));
-    let mut read: ProgressiveScene = input.read_or_make(warnings, |scene, warnings| {
+    let simplify = |scene: Scene, warnings: &mut Warnings| -> Result<ProgressiveScene, Failure> {
         interrupt.be_graceful();
         let progress = Progress::new(interrupt, quiet, "simplifying");
         let built = build_progressive(scene, &job, &progress).map_err(|e| failed(&e))?;
@@ -136,7 +137,15 @@ pub(crate) fn make(
         }
         warnings.say(built.warnings.iter().map(|w| format!("{file}: {w}")));
         Ok(built.scene)
-    })?;
+    };
+    let mut read = input.read_or_make(warnings, simplify)?;
+    if !read.meshes.iter().all(ProgressiveMesh::is_reorderable) {
+        warnings
+            .say([format!("{file}: its splits can only be made in their own order: new ones are used here")]);
+        let full =
+            read.at(&read.positions(Detail::Full)).map_err(|(m, e)| failed(&format!("mesh {m}: {e}")))?;
+        read = simplify(full, warnings)?;
+    }
     interrupt.be_graceful();
     let (read_seconds, start) = (start.elapsed().as_secs_f64(), Instant::now());
     let options = rule.options(&mut read);

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::args::Input;
 use super::common::thousands;
-use progmesh::io::files;
+use progmesh::io::{files, pm::hoppe};
 use progmesh::selective::PagedScene;
 use serde::Serialize;
 
@@ -32,6 +32,12 @@ pub(crate) fn open(input: &Input, mib: usize) -> Result<PagedScene, Failure> {
         )));
     };
     let source = files::open(path).map_err(|e| Failure::Input(format!("{file}: {e}")))?;
+    let mut first = vec![0; source.length().min(4096) as usize];
+    if source.read_at(0, &mut first).is_ok() && hoppe::looks_like(&first) {
+        return Err(Failure::Input(format!(
+            "{file}: a progressive mesh of Hoppe's, which has no pages: write one of ours first (progmesh encode {file} out.pm --paged)"
+        )));
+    }
     let limit = mib.saturating_mul(1 << 20);
     PagedScene::new(source, limit).map_err(|e| Failure::Input(format!("{file}: {e}")))
 }

@@ -175,7 +175,7 @@ impl ProgressiveMesh {
     /// [`super::Cursor::seek_error`] find the best there is. For meshes that were read from files, where splits come in chunks. `None` where
     /// splits name wedges at their tips outright, which only the order that is there does justice to, and of damaged meshes. O(n log n).
     pub fn sorted_by_error(&self) -> Option<ProgressiveMesh> {
-        if self.names_tips() || self.order.as_ref().is_some_and(|o| !o.fits(self)) {
+        if !self.is_reorderable() || self.order.as_ref().is_some_and(|o| !o.fits(self)) {
             return None;
         }
         // Whatever the arrays say, it leads to full detail.
@@ -185,15 +185,14 @@ impl ProgressiveMesh {
         Some(sorted)
     }
 
-    /// Some split names the wedge at a tip.
-    fn names_tips(&self) -> bool {
-        let Some(streams) = &self.wedges else { return false };
-        self.rows_of_splits().into_iter().zip(&self.splits.code).any(|(r, code)| {
+    /// No split names the wedge at a tip outright: so [`ProgressiveMesh::dependencies`] are all there are, as files of ours and view-dependent refinement take it.
+    /// O(n).
+    pub fn is_reorderable(&self) -> bool {
+        let Some(streams) = &self.wedges else { return true };
+        !self.rows_of_splits().into_iter().zip(&self.splits.code).any(|(r, code)| {
             let entry = streams.explicit.get(r.explicit).unwrap_or_default();
-            let faces = 1 + code.two_faces() as usize;
-            let corners =
-                entry.len().checked_sub(3 * faces).and_then(|at| entry.get(at..)).unwrap_or_default();
-            corners.chunks_exact(3).any(|c| c[2] != NONE)
+            let corners = entry.len().saturating_sub(3 * (1 + code.two_faces() as usize));
+            entry[corners..].chunks_exact(3).any(|c| c[2] != NONE)
         })
     }
 

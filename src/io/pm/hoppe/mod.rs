@@ -4,7 +4,7 @@
 //! so that refining and coarsening are exact here. Faces, vertices and wedges keep his numbers at every split count.
 //!
 //! Not guaranteed: that the splits can be put into another order, as our own files do. His records may make wedges at vertices beside the split one,
-//! which our dependencies do not know of. `progmesh encode` makes new splits of the mesh at full detail.
+//! which our dependencies do not know of ([`ProgressiveMesh::is_reorderable`]). `progmesh encode`, and for views `extract` and `fly`, make new splits of the mesh at full detail.
 
 mod apply;
 mod read;
