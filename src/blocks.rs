@@ -226,7 +226,14 @@ pub fn blocks<'a>(
     let layout = layout.with_scale(scale).with_slack(frame.slack(columns, rows));
     let levels = layout.levels();
     let total: usize = (0..levels).map(|l| layout.blocks(l).iter().product::<usize>()).sum();
-    let work = Work { raster, layout, options, store, control };
+    let spacing = options.spacing;
+    let rounding = frame.rounding() * spacing[0];
+    // What rounding takes of the floor is not there for triangles.
+    let floor = match options.floor > rounding {
+        true if rounding > 0.0 => (options.floor - rounding).next_down(),
+        _ => options.floor,
+    };
+    let work = Work { raster, layout, options, floor, store, control };
     let (done, found) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let mut heads: Vec<Vec<BlockHead>> = vec![];
     for level in 0..levels {
@@ -262,10 +269,9 @@ pub fn blocks<'a>(
     if triangles >= MOST_FACES {
         return Err(BuildError::TooLarge(triangles));
     }
-    let spacing = options.spacing;
     let figures = Figures {
         spacing,
-        error: all().map(|h| h.error).fold(0.0, f64::max) + frame.rounding() * spacing[0],
+        error: all().map(|h| h.error).fold(0.0, f64::max) + rounding,
         levels,
         blocks: total,
         found: found.into_inner(),
@@ -324,6 +330,8 @@ struct Work<'a> {
     raster: &'a dyn Raster,
     layout: Layout,
     options: &'a Options,
+    /// That of the options, less what rounding of the mesh adds.
+    floor: f64,
     store: &'a dyn Store,
     control: &'a dyn Control,
 }
@@ -355,7 +363,7 @@ impl Work<'_> {
         }
         let mut below = vec![];
         let block = if level == 0 {
-            leaf(self.raster, &self.layout, at, self.options.floor)?
+            leaf(self.raster, &self.layout, at, self.floor)?
         } else {
             below = children(&self.layout, level, at);
             let sheets = below.iter().map(|&child| self.sheet(level - 1, child)).collect::<Result<_, _>>()?;

@@ -70,7 +70,7 @@ pub fn encode(tile: &Tile) -> Vec<u8> {
             indices.push(number[v as usize]);
         }
     }
-    let mut out = header(tile, &order);
+    let mut out = header(tile, order.iter().map(|&v| rounded[v as usize]));
     out.extend((order.len() as u32).to_le_bytes());
     for k in [0, 1, 2] {
         let mut last = 0i32;
@@ -108,15 +108,15 @@ pub fn encode(tile: &Tile) -> Vec<u8> {
     out
 }
 
-/// Centre, heights, bounding sphere and horizon: 88 bytes.
-fn header(tile: &Tile, order: &[u32]) -> Vec<u8> {
+/// Centre, heights, bounding sphere and horizon of vertices as readers place them: 88 bytes.
+fn header(tile: &Tile, rounded: impl Iterator<Item = [u16; 3]>) -> Vec<u8> {
     let [west, south, east, north] = tile.bounds;
-    let places: Vec<DVec3> = order
-        .iter()
-        .map(|&v| {
-            let p = tile.vertices[v as usize];
-            let degrees = [west + p.u * (east - west), south + p.v * (north - south)];
-            earth_centred(degrees, p.height).into()
+    let [least, greatest] = tile.heights.map(f64::from);
+    let places: Vec<DVec3> = rounded
+        .map(|p| {
+            let [u, v, h] = p.map(|c| f64::from(c) / MOST);
+            let degrees = [west + u * (east - west), south + v * (north - south)];
+            earth_centred(degrees, least + h * (greatest - least)).into()
         })
         .collect();
     let low = places.iter().copied().reduce(DVec3::min).unwrap_or_default();
@@ -222,6 +222,28 @@ mod tests {
         assert_eq!(octahedral([0.0, -1.0, 0.0]), [128, 0]);
         let below = octahedral([0.0, 0.0, -1.0]);
         assert_eq!(below, [255, 255]);
+    }
+
+    #[test]
+    fn the_sphere_holds_vertices_as_they_are_rounded() {
+        // A tile of 180 degrees: a step of its numbers is 600 m.
+        let at = |u: f64, v: f64, height: f64| Vertex { u, v, height, normal: [0.0, 0.0, 1.0] };
+        let tile = Tile {
+            bounds: [0.0, -90.0, 180.0, 90.0],
+            heights: [0.0, 100.0],
+            vertices: vec![at(0.10002, 0.70002, 3.0), at(0.10009, 0.70002, 90.0), at(0.10002, 0.70009, 50.0)],
+            triangles: vec![[0, 1, 2]],
+        };
+        let bytes = encode(&tile);
+        let number = |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        let (centre, radius) = (DVec3::from([32, 40, 48].map(number)), number(56));
+        let mut farthest = 0.0f64;
+        for p in &tile.vertices {
+            let [u, v, h] = [p.u, p.v, p.height / 100.0].map(|c| (c * MOST).round() / MOST);
+            let place = DVec3::from(earth_centred([180.0 * u, 180.0 * v - 90.0], 100.0 * h));
+            farthest = farthest.max(place.distance(centre));
+        }
+        assert!((farthest - radius).abs() < 1e-6, "{farthest} {radius}");
     }
 
     #[test]

@@ -273,6 +273,20 @@ fn random(state: &mut u64) -> f64 {
 }
 
 #[test]
+fn a_grid_of_one_block_goes_down_to_its_base_like_any_other() {
+    for slope in [0.0, 2.0] {
+        let plane = Grid::new(33, 30, (0..33 * 30).map(|i| slope * f64::from(i % 33)).collect()).unwrap();
+        let whole = landscape(5, 33, 30, false);
+        for (grid, most) in [(plane, 4), (whole, 40)] {
+            for cells in [16, 32, 64] {
+                let (_, root) = build(&grid, cells, 0.0, 1 << 20);
+                assert!(root.faces.len() <= most, "{slope} {cells}: {}", root.faces.len());
+            }
+        }
+    }
+}
+
+#[test]
 fn bounds_hold_for_any_closed_set_of_splits() {
     let mut used: Vec<f64> = vec![];
     for (seed, columns, rows, cells, floor, voids, samples) in [

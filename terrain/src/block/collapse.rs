@@ -46,6 +46,11 @@ pub struct Rules {
 }
 
 impl Rules {
+    /// For a block of so many vertices: a quarter stays for the level above, and at the root what must.
+    pub(super) fn for_part(self, vertices: usize) -> Rules {
+        Rules { vertices: if self.shared == [false; 4] { 0 } else { vertices / 4 }, ..self }
+    }
+
     fn is_shared(&self, v: Vertex) -> bool {
         let at = [v.x, v.x, v.y, v.y];
         (0..4).any(|k| self.shared[k] && at[k] == self.rectangle[k])

@@ -124,7 +124,7 @@ pub fn join(sheets: Vec<Sheet>, relief: &Relief, rules: &Rules) -> Result<Block,
         children.push(Child { vertices: map, faces });
     }
     let vertices = all.vertices.clone();
-    let rules = Rules { vertices: if rules.shared == [false; 4] { 0 } else { vertices.len() / 4 }, ..*rules };
+    let rules = rules.for_part(vertices.len());
     let made = collapse(all, relief, &rules).ok_or(BlockError::NoNeighbours)?;
     Ok(Block::new(vertices, made, children, 0.0))
 }

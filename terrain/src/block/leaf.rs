@@ -114,7 +114,7 @@ impl Layout {
     }
 }
 
-/// Makes a block of level 0: triangulates its samples, each within `floor` of the triangles, or (at 0) each a vertex; then collapses three vertices of four. O(samples log samples).
+/// Makes a block of level 0: triangulates its samples, each within `floor` of the triangles, or (at 0) each a vertex; then collapses three vertices of four, or as many as go if it is the only block. O(samples log samples).
 ///
 /// On the lines between blocks the vertices depend on the samples there and beside only, so neighbours agree.
 ///
@@ -146,7 +146,7 @@ pub fn leaf(raster: &dyn Raster, layout: &Layout, at: [usize; 2], floor: f64) ->
             z: grid.heights()[y as usize * window.columns + x as usize] as f32,
         })
         .collect();
-    let rules = layout.rules(0, at, vertices.len() / 4);
+    let rules = layout.rules(0, at, 0).for_part(vertices.len());
     let started = vertices.clone();
     let error = faces
         .iter()
