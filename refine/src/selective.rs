@@ -26,7 +26,9 @@ mod motions;
 mod output;
 mod patch;
 mod queue;
+mod refine;
 mod regulator;
+mod sieve;
 mod timed;
 
 pub(crate) use adapt::Meter;
@@ -44,8 +46,22 @@ pub(crate) use patch::{Known, Sheet, split, unsplit};
 pub use regulator::Regulator;
 pub use timed::TimedMorph;
 
+use crate::aif::NONE;
 use crate::hierarchy::Hierarchy;
 use std::sync::Arc;
+
+/// A split that is to be applied, and where its cuts lie, as far as that is known.
+#[derive(Clone, Copy, Debug, Default)]
+struct Split {
+    id: u32,
+    cuts: [u32; 2],
+}
+
+impl Split {
+    fn new(id: u32) -> Split {
+        Split { id, cuts: [NONE; 2] }
+    }
+}
 
 /// A mesh between base and full detail, finer where a view needs it.
 ///
@@ -111,7 +127,7 @@ impl View {
         assert!(i < self.hierarchy.splits(), "split {i} of {}", self.hierarchy.splits());
         let mut all = Vec::new();
         self.closure(i as u32, usize::MAX, &mut all);
-        all.iter().for_each(|&j| self.apply(j));
+        all.iter().for_each(|&j| self.apply(&Split::new(j)));
         all.len()
     }
 
@@ -173,10 +189,23 @@ impl View {
         out.len() - from <= most
     }
 
-    /// Applies split `i`, whose dependencies are applied. Both its vertices are due.
-    fn apply(&mut self, i: u32) {
+    /// Finds where the cuts of splits lie, as far as their faces are there, and reads what applying them begins with: the processor then waits for all of that together.
+    fn make_ready<'a>(&self, splits: &[u32], out: &'a mut [Split]) -> &'a [Split] {
         let h = &*self.hierarchy;
-        let done = self.front.split(h.mesh(), &h.forest, i, None);
+        let n = splits.len().min(out.len());
+        for (s, &i) in out.iter_mut().zip(splits) {
+            *s = Split { cuts: self.front.cuts(h.mesh(), &h.forest, i), ..Split::new(i) };
+        }
+        let sum = out[..n].iter().fold(0, |sum, s| sum ^ self.front.fetch(s.cuts));
+        std::hint::black_box(sum);
+        &out[..n]
+    }
+
+    /// Applies a split whose dependencies are applied. Both its vertices are due.
+    fn apply(&mut self, split: &Split) {
+        let h = &*self.hierarchy;
+        let i = split.id;
+        let done = self.front.split_at(h.mesh(), &h.forest, (i, split.cuts), None);
         // The hierarchy has gone through all splits; the four faces of a split are the same in every order.
         debug_assert!(done.is_ok(), "{done:?}");
         let Ok(record) = done else { return };
@@ -190,17 +219,17 @@ impl View {
         }
     }
 
-    /// Undoes split `i`, which is applied and free. Its vertex is due, and so is what has become free.
+    /// Undoes split `i`, which is applied and free. Its vertex is due, since before now, by which it is told from those that have been looked at; and so is what has become free.
     fn undo(&mut self, i: u32) {
         let h = &*self.hierarchy;
         self.front.unsplit(h.mesh(), &h.forest, i);
         let old = self.front.record_of_vertex(h.mesh().splits.vertex[i as usize]);
-        self.front.records[old as usize].due = self.clock.now();
+        self.front.records[old as usize].due = self.clock.now().wrapping_sub(1);
         for &d in h.forest.needs.of(i) {
             let r = self.front.record(d) as usize;
             let record = &mut self.front.records[r];
             record.dependents -= 1;
-            if record.dependents == 0 {
+            if record.dependents == 0 && !Clock::has_come(self.clock.now(), record.due) {
                 record.due = self.clock.now();
             }
         }

@@ -21,8 +21,8 @@ pub(crate) struct Forest {
     starts: Offsets,
     chains: Vec<u32>,
     two_faces: Ranks,
-    /// The split that makes every 64th face of splits, and a bit: it is its second.
-    makers: Vec<u32>,
+    /// Of the faces of splits: those that are the first of theirs.
+    firsts: Ranks,
     moves: Ranks,
     /// What splits need by the rule of the hierarchy.
     pub(crate) needs: Needs,
@@ -30,10 +30,11 @@ pub(crate) struct Forest {
     pub(crate) rows: Option<Rows>,
 }
 
-/// Bits, and how many are set before each of them.
+/// Bits, and how many are set before each of them; nothing if none is.
 #[derive(Clone, Debug, Default)]
 struct Ranks {
     bits: Vec<u64>,
+    /// Of every 64.
     before: Vec<u32>,
     set: usize,
 }
@@ -51,18 +52,26 @@ impl Ranks {
                 r.set += 1;
             }
         }
+        if r.set == 0 {
+            return Ranks::default();
+        }
+        r.bits.shrink_to_fit();
+        r.before.shrink_to_fit();
         r
     }
 
     #[inline]
     fn before(&self, i: u32) -> u32 {
         let (word, bit) = (i as usize / 64, i % 64);
-        self.before[word] + (self.bits[word] & ((1 << bit) - 1)).count_ones()
+        match self.bits.get(word) {
+            Some(bits) => self.before[word] + (bits & ((1 << bit) - 1)).count_ones(),
+            None => 0,
+        }
     }
 
     #[inline]
     fn get(&self, i: u32) -> bool {
-        self.bits[i as usize / 64] >> (i % 64) & 1 != 0
+        self.bits.get(i as usize / 64).is_some_and(|bits| bits >> (i % 64) & 1 != 0)
     }
 
     fn bytes(&self) -> usize {
@@ -85,24 +94,17 @@ impl Forest {
             chains[next[v as usize] as usize] = i;
             next[v as usize] += 1;
         }
-        let mut face = 0u32;
-        let mut makers = Vec::with_capacity(n / 32 + 1);
-        for (i, code) in (0u32..).zip(&pm.splits.code) {
-            let first = face;
-            face += 1 + code.two_faces() as u32;
-            while 64 * makers.len() < face as usize {
-                makers.push(i << 1 | u32::from(64 * makers.len() > first as usize));
-            }
-        }
+        let face = n + pm.splits.code.iter().filter(|c| c.two_faces()).count();
+        let both = |two: bool| std::iter::once(true).chain(two.then_some(false));
         let base_faces = pm.base_faces.len() as u32;
         Forest {
             base_vertices: pm.base_vertices() as u32,
             base_faces,
-            faces: base_faces + face,
+            faces: base_faces + face as u32,
             starts: Offsets::new(starts),
             chains,
             two_faces: Ranks::new(pm.splits.code.iter().map(|c| c.two_faces())),
-            makers,
+            firsts: Ranks::new(pm.splits.code.iter().flat_map(|c| both(c.two_faces()))),
             moves: Ranks::new(pm.splits.code.iter().map(|c| c.moves())),
             needs: Needs::default(),
             rows: Rows::new(pm),
@@ -207,17 +209,9 @@ impl Forest {
             return None;
         }
         let k = f.checked_sub(self.base_faces)?;
-        // Where most splits make two faces, one step leads there.
-        let mark = self.makers[k as usize / 64];
-        let (mut i, mut ahead) = (mark >> 1, k % 64 + (mark & 1));
-        loop {
-            if ahead == 0 || (ahead == 1 && self.two_faces.get(i)) {
-                return Some((i, ahead == 1));
-            }
-            // Never beyond it: a split makes two at most.
-            i += (ahead / 2).max(1);
-            ahead = k - (i + self.two_faces.before(i));
-        }
+        // As many splits have begun as faces that are the first of theirs.
+        let first = self.firsts.get(k);
+        Some((self.firsts.before(k) + u32::from(first) - 1, !first))
     }
 
     /// Where vertex `v` stands after the first `k` splits of its chain: the array, and the place in it.
@@ -269,11 +263,12 @@ impl Forest {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        4 * (self.chains.len() + self.makers.len())
+        4 * self.chains.len()
             + self.starts.bytes()
             + self.needs.bytes()
             + self.rows.as_ref().map_or(0, Rows::bytes)
             + self.two_faces.bytes()
+            + self.firsts.bytes()
             + self.moves.bytes()
     }
 }

@@ -1,9 +1,8 @@
 //! From the mesh of the last frame to that of this one.
 
-use super::clock::{Clock, Judges, Verdict};
+use super::clock::{Clock, Found, Judges};
 use super::entry::Entry;
-use super::queue::Queue;
-use super::{Lens, View};
+use super::{Lens, Split, View};
 use crate::aif::NONE;
 
 /// How far a frame may go.
@@ -93,7 +92,7 @@ impl<'a> Meter<'a> {
     }
 
     /// Room for faces.
-    fn room(&self, faces: usize) -> usize {
+    pub(super) fn room(&self, faces: usize) -> usize {
         self.limits.faces.saturating_sub(faces)
     }
 
@@ -105,29 +104,23 @@ impl<'a> Meter<'a> {
 
 /// A record that is due.
 #[derive(Clone, Copy)]
-struct Due {
-    record: u32,
+pub(super) struct Due {
+    pub(super) record: u32,
     /// The split that it is of: it may be used again.
-    made: u32,
-    /// The slack of the decision to keep that split, if that was found.
-    kept: Option<f64>,
+    pub(super) made: u32,
+    /// The slack of the decision to keep that split; 0 if that was not found.
+    pub(super) kept: f32,
 }
 
 /// What was found out about a record ahead: whether to keep its split, if that could be undone, and whether the next is needed.
 #[derive(Clone, Copy)]
-struct Look {
-    keep: Option<Verdict>,
-    next: Option<(u32, Verdict)>,
+pub(super) struct Look {
+    keep: Option<Found>,
+    pub(super) next: Option<Found>,
 }
 
-/// How far [`View::apply_with_all`] came.
-enum Applied {
-    Wholly,
-    /// There is no room for the faces.
-    Refused,
-    /// Another limit cut it short.
-    Partly,
-}
+/// Splits that are looked at, or got ready, at a time: enough that memory is waited for together, and few enough to be in the nearest cache.
+pub(super) const LOT: usize = 32;
 
 /// Records from which on threads look ahead: below, handing out the work takes as long.
 #[cfg(feature = "parallel")]
@@ -153,7 +146,7 @@ impl View {
             && !self.front.is_applied(i)
             && judges.want(&Entry::of(&self.hierarchy, i))
         {
-            self.apply_with_all(i, &mut meter, &mut Vec::new());
+            self.apply_with_all(&Split::new(i), &mut meter, &mut Vec::new());
         }
         let ahead = self.look_ahead(&due, &judges, limits);
         self.resume = 0;
@@ -181,7 +174,7 @@ impl View {
                         r.due = late;
                     } else if all || Clock::has_come(now, r.due) {
                         r.due = now;
-                        due.push(Due { record: k, made: r.made, kept: None });
+                        due.push(Due { record: k, made: r.made, kept: 0.0 });
                     }
                 }
             }
@@ -207,28 +200,50 @@ impl View {
         self.look_at(due, judges)
     }
 
-    /// Each step for all before the next: they wait for memory, and then wait together.
+    /// Each step for a lot before the next: they wait for memory, and then wait together.
     fn look_at(&self, due: &[Due], judges: &Judges<'_>) -> Vec<Look> {
-        let h = &*self.hierarchy;
-        let mut keep: Vec<Option<Entry>> = Vec::with_capacity(due.len());
-        let mut next: Vec<Option<Entry>> = Vec::with_capacity(due.len());
-        // Vertices, and how many of their splits are applied.
-        let turns = due.iter().map(|d| {
-            let there = self.front.records[d.record as usize].made == d.made;
-            let v = self.front.vertex_of_record(d.record);
-            there.then(|| (v, self.front.turns(&h.forest, v)))
-        });
-        let turns: Vec<Option<(u32, usize)>> = turns.collect();
-        keep.extend(due.iter().map(|d| self.is_last(d).then(|| Entry::of(h, d.made))));
-        next.extend(turns.iter().map(|t| {
-            let (v, k) = (*t)?;
-            h.forest.chain(v).get(k).map(|&i| Entry::after(h, i, v, k))
-        }));
-        let look = |(keep, next): (Option<Entry>, Option<Entry>)| Look {
-            keep: keep.map(|e| judges.of_last(&e, &self.clock)),
-            next: next.map(|e| (e.split, judges.of_next(&e, &self.clock))),
-        };
-        keep.into_iter().zip(next).map(look).collect()
+        let (h, forest) = (&*self.hierarchy, &self.hierarchy.forest);
+        let (last, next) = (judges.last(&self.clock), judges.next(&self.clock));
+        let mut looks = vec![Look { keep: None, next: None }; due.len()];
+        let (mut entries, mut found) = (Vec::with_capacity(LOT), Vec::with_capacity(LOT));
+        for (part, looks) in due.chunks(LOT).zip(looks.chunks_mut(LOT)) {
+            // The splits of each vertex, and how many of them are applied; of the vertex that was split to make it as well.
+            let mut chains = [[&[][..]; 2]; LOT];
+            let mut turns = [0; LOT];
+            let mut lasts = [false; LOT];
+            for ((chains, is), d) in chains.iter_mut().zip(&mut lasts).zip(part) {
+                chains[0] = forest.chain(self.front.vertex_of_record(d.record));
+                *is = self.is_last(d);
+                chains[1] = if *is { forest.chain(h.mesh().splits.vertex[d.made as usize]) } else { &[] };
+            }
+            for (t, chains) in turns.iter_mut().zip(&chains) {
+                *t = self.front.turns_of(chains[0]);
+            }
+            entries.clear();
+            found.clear();
+            for ((d, chains), _) in part.iter().zip(&chains).zip(lasts).filter(|l| l.1) {
+                let turn = chains[1].iter().position(|&i| i >= d.made).unwrap_or(0);
+                entries.push(Entry::after(h, d.made, h.mesh().splits.vertex[d.made as usize], turn));
+            }
+            last.look(&entries, &mut found);
+            let kept = looks.iter_mut().zip(lasts).filter(|l| l.1);
+            kept.zip(&found).for_each(|((look, _), &f)| look.keep = Some(f));
+            entries.clear();
+            found.clear();
+            let mut open = [false; LOT];
+            for (((d, chains), &turn), open) in part.iter().zip(&chains).zip(&turns).zip(&mut open) {
+                if self.front.records[d.record as usize].made == d.made
+                    && let Some(&i) = chains[0].get(turn)
+                {
+                    *open = true;
+                    entries.push(Entry::after(h, i, self.front.vertex_of_record(d.record), turn));
+                }
+            }
+            next.look(&entries, &mut found);
+            let open = looks.iter_mut().zip(open).filter(|l| l.1);
+            open.zip(&found).for_each(|((look, _), &f)| look.next = Some(f));
+        }
+        looks
     }
 
     /// The record is still what it was, and nothing depends on its split: that could be undone.
@@ -240,146 +255,58 @@ impl View {
 
     /// Undoes splits that are not needed, until none is left that could be.
     fn coarsen(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, due: &mut [Due], ahead: &[Look]) {
-        let mut stack = Vec::new();
+        let mut freed = Vec::new();
         for (k, d) in due.iter_mut().enumerate() {
             if !meter.goes_on() {
                 self.resume = d.record;
                 return;
             }
-            if !self.is_last(d) {
+            // What has become free in the meantime is in the other list.
+            if !self.is_last(d) || (!ahead.is_empty() && ahead[k].keep.is_none()) {
                 continue;
             }
             meter.looks += 1;
             let known = ahead.get(k).and_then(|a| a.keep);
-            let look = || judges.of_last(&Entry::of(&self.hierarchy, d.made), &self.clock);
-            let verdict = known.unwrap_or_else(look);
-            if verdict.wanted {
-                d.kept = Some(verdict.slack);
+            let look = || judges.of_last(&Entry::of(&self.hierarchy, d.made), &self.clock).into();
+            let found = known.unwrap_or_else(look);
+            if found.wanted {
+                d.kept = found.slack;
                 continue;
             }
-            stack.push((d.made, true));
-            while let Some((i, sure)) = stack.pop() {
-                // It may have come in twice.
-                if !self.front.is_applied(i) || !self.is_free(i) {
-                    continue;
-                }
-                if !sure {
-                    meter.looks += 1;
-                    if judges.keep(&Entry::of(&self.hierarchy, i)) {
-                        continue;
-                    }
-                }
-                // What is left on the stack is due, as it has become free.
-                if !meter.goes_on() {
-                    self.resume = d.record;
-                    return;
-                }
-                self.undo(i);
-                meter.done.collapses += 1;
-                meter.since += 1;
-                let needs = self.hierarchy.forest.needs.of(i).iter();
-                stack.extend(needs.filter(|&&n| self.is_free(n)).map(|&n| (n, false)));
-            }
-        }
-    }
-
-    /// Applies split `i` and all it depends on.
-    fn apply_with_all(&mut self, i: u32, meter: &mut Meter<'_>, closure: &mut Vec<u32>) -> Applied {
-        closure.clear();
-        // A split makes a face at least.
-        let room = meter.room(self.face_count());
-        let fits = self.closure(i, room, closure);
-        if meter.limits.faces < usize::MAX {
-            let forest = &self.hierarchy.forest;
-            let faces: usize = closure.iter().map(|&j| 1 + forest.two_faces(j) as usize).sum();
-            if !fits || faces > room {
-                meter.done.refused += 1;
-                return Applied::Refused;
-            }
-        }
-        for &j in &*closure {
-            if !meter.goes_on() {
-                self.unfinished = Some(i);
-                return Applied::Partly;
-            }
-            self.apply(j);
-            meter.done.splits += 1;
+            self.undo_and_list(d.made, &mut freed);
+            meter.done.collapses += 1;
             meter.since += 1;
-            meter.done.forced += usize::from(j != i);
         }
-        Applied::Wholly
-    }
-
-    /// The splits that replace the vertices that split `i` makes, to be decided about.
-    #[inline]
-    fn below(&self, i: u32) -> [Option<Entry>; 2] {
-        let h = &*self.hierarchy;
-        let old = h.mesh().splits.vertex[i as usize];
-        let chain = h.forest.chain(old);
-        // Mostly the last but few.
-        let turn = chain.iter().rposition(|&k| k <= i).map_or(0, |k| k + 1);
-        let (at, moved) = h.forest.places_after(h.mesh(), i);
-        let next = chain
-            .get(turn)
-            .map(|&below| Entry::at(h, below, moved.unwrap_or_else(|| h.forest.place(h.mesh(), old, turn))));
-        let new = h.forest.chain(h.forest.base_vertices + i).first();
-        [next, new.map(|&below| Entry::at(h, below, at))]
-    }
-
-    /// Applies splits that are needed, until none is left.
-    fn refine(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, due: &[Due], ahead: &[Look]) {
-        // What comes first matters only if not all will be done.
-        let sorted = meter.limits.faces < usize::MAX
-            || meter.limits.operations < usize::MAX
-            || meter.limits.expired.is_some();
-        let mut queue = Queue::new(sorted, self.hierarchy.splits());
-        for (k, d) in due.iter().enumerate() {
-            if !meter.goes_on() {
-                self.resume = d.record;
-                return;
-            }
-            let record = self.front.records[d.record as usize];
-            if record.made != d.made {
-                continue;
-            }
-            // What has become free since it was looked at stays due.
-            let kept = match d.kept {
-                _ if d.made == NONE || record.dependents > 0 => f64::INFINITY,
-                Some(slack) => slack,
-                None => 0.0,
-            };
-            let Some((i, v, turn)) = self.next(d.record) else {
-                self.front.records[d.record as usize].due = self.clock.due(kept, d.record);
-                continue;
-            };
-            meter.looks += 1;
-            let known = ahead.get(k).and_then(|a| a.next).filter(|n| n.0 == i);
-            let entry = || Entry::after(&self.hierarchy, i, v, turn);
-            let verdict = known.map_or_else(|| judges.of_next(&entry(), &self.clock), |n| n.1);
-            if verdict.wanted {
-                queue.push(i, || judges.rank(&entry()));
-            } else {
-                self.front.records[d.record as usize].due = self.clock.due(kept.min(verdict.slack), d.record);
-            }
-        }
-        let mut closure = Vec::new();
-        while let Some(i) = queue.pop() {
-            // Others may have needed it before.
-            if !self.front.is_applied(i) {
-                if meter.is_full(self.face_count()) {
-                    meter.done.refused += 1 + queue.len();
+        let last = judges.last(&self.clock);
+        let (mut entries, mut kept) = (Vec::new(), Vec::new());
+        while !freed.is_empty() {
+            let lot = freed.split_off(freed.len().saturating_sub(LOT));
+            entries.clear();
+            kept.clear();
+            entries.extend(lot.iter().map(|&i| Entry::of(&self.hierarchy, i)));
+            last.wanted(&entries, &mut kept);
+            meter.looks += lot.len();
+            for (&i, _) in lot.iter().zip(&kept).filter(|k| !k.1) {
+                // What is left of the list is due, as it has become free.
+                if !meter.goes_on() {
+                    self.resume = due.first().map_or(0, |d| d.record);
                     return;
                 }
-                match self.apply_with_all(i, meter, &mut closure) {
-                    Applied::Wholly => {}
-                    Applied::Refused => continue,
-                    Applied::Partly => return,
+                // It may have come in twice.
+                if self.front.is_applied(i) && self.is_free(i) {
+                    self.undo_and_list(i, &mut freed);
+                    meter.done.collapses += 1;
+                    meter.since += 1;
                 }
             }
-            // Below what only others need nothing is needed, as bounds nest.
-            for e in self.below(i).into_iter().flatten().filter(|e| judges.want(e)) {
-                queue.push(e.split, || judges.rank(&e));
-            }
         }
+    }
+
+    /// Undoes split `i`; appends what has become free by that.
+    #[inline]
+    fn undo_and_list(&mut self, i: u32, freed: &mut Vec<u32>) {
+        self.undo(i);
+        let needs = self.hierarchy.forest.needs.of(i);
+        freed.extend(needs.iter().copied().filter(|&n| self.is_free(n)));
     }
 }

@@ -13,6 +13,7 @@
 use super::Lens;
 use super::entry::Entry;
 use super::lens::turned;
+use super::sieve::Sieve;
 use crate::hierarchy::CHANGE;
 
 /// Whether a split is needed, and how far lenses may move before that can change.
@@ -20,6 +21,20 @@ use crate::hierarchy::CHANGE;
 pub(crate) struct Verdict {
     pub(crate) wanted: bool,
     pub(crate) slack: f64,
+}
+
+/// The same, smaller: where there are many.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Found {
+    pub(super) wanted: bool,
+    pub(super) slack: f32,
+}
+
+impl From<Verdict> for Found {
+    fn from(v: Verdict) -> Found {
+        // Rounding is far less than what is [`SAFE`].
+        Found { wanted: v.wanted, slack: v.slack as f32 }
+    }
 }
 
 /// What places are measured from.
@@ -31,12 +46,12 @@ enum About {
 
 /// How slack is measured: it must not change while decisions stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Pace {
+pub(super) struct Pace {
     about: About,
     /// Length of the diagonal of the finest mesh's box.
-    diagonal: f64,
+    pub(super) diagonal: f64,
     /// How much of the clock's distance a change of the tolerance by a factor of e is, if it may change; infinite if not: then any change begins anew.
-    per_tau: f64,
+    pub(super) per_tau: f64,
 }
 
 /// Adds up how far lenses move.
@@ -54,14 +69,14 @@ const STEPS: f64 = 131_072.0;
 /// The most steps ahead that a time can be: half of all, less some.
 const AHEAD: u16 = 32_000;
 /// The eye's way counts by this: turned cones depend on it, what is seen circling about the mesh hardly. At a distance of a diagonal, both then take up the same.
-const EYE: f64 = 0.5;
+pub(super) const EYE: f64 = 0.5;
 /// Of the slack that is found by the formulas: they are exact, numbers are not.
 const SAFE: f64 = 0.999;
 /// Cones and spheres are decided about to such a part of the distance.
 const ROUNDING: f64 = 1e-7;
 
 impl Pace {
-    fn of(lens: &Lens, diagonal: f64, per_tau: f64) -> Pace {
+    pub(super) fn of(lens: &Lens, diagonal: f64, per_tau: f64) -> Pace {
         let outside = !lens.perspective || lens.eye.length() > 0.5 * diagonal;
         Pace { about: if outside { About::Middle } else { About::Eye }, diagonal, per_tau }
     }
@@ -71,6 +86,15 @@ impl Pace {
         match self.about {
             About::Middle => 0.5 * self.diagonal,
             About::Eye => self.diagonal,
+        }
+    }
+
+    /// How much less slack counts far away, never more than it does: the larger of 1 and the sum of the first times the distance from the middle, the second times that from the eye, and the third.
+    pub(super) fn far_parts(&self) -> [f64; 3] {
+        match self.about {
+            About::Middle => [1.0 / self.reach(), 0.0, 0.0],
+            // The eye comes no farther away than the clock reaches.
+            About::Eye => [0.0, 1.0 / self.reach(), 0.25],
         }
     }
 
@@ -84,7 +108,7 @@ impl Pace {
     }
 
     /// A distance that is at least how much any decision's functions change from `a` to `b`, each at the tolerances given; `None` if there is none.
-    fn motion(&self, (a, at): (&Lens, f64), (b, bt): (&Lens, f64)) -> Option<f64> {
+    pub(super) fn motion(&self, (a, at): (&Lens, f64), (b, bt): (&Lens, f64)) -> Option<f64> {
         let same = a.frustum.is_some() == b.frustum.is_some()
             && (a.back, a.perspective, a.near, a.slant) == (b.back, b.perspective, b.near, b.slant)
             && a.directional == b.directional
@@ -196,15 +220,12 @@ impl Clock {
 
 impl Lens {
     /// [`Lens::wants`], and how far the lens may move before that can change.
-    fn verdict(&self, e: &Entry, tau: f64, pace: &Pace) -> Verdict {
+    pub(super) fn verdict(&self, e: &Entry, tau: f64, pace: &Pace) -> Verdict {
         let (centre, radius) = (e.centre.as_dvec3(), e.radius as f64);
         let line = centre - self.eye;
         let away = line.length();
-        let far = match pace.about {
-            About::Middle => (centre.length() / pace.reach()).max(1.0),
-            // The eye comes no farther away than the clock reaches.
-            About::Eye => (away / pace.reach() + 0.25).max(1.0),
-        };
+        let [middle, eye, more] = pace.far_parts();
+        let far = (middle * centre.length() + eye * away + more).max(1.0);
         let mut slack = f64::INFINITY;
         if tau > 0.0 {
             if tau == f64::INFINITY {
@@ -352,6 +373,24 @@ impl<'a> Judges<'a> {
         all
     }
 
+    /// To ask whether each of many splits is needed.
+    pub(super) fn next(&self, clock: &Clock) -> Many<'a> {
+        self.many(1.0, &clock.pace)
+    }
+
+    /// To ask whether each of many splits is to be kept.
+    pub(super) fn last(&self, clock: &Clock) -> Many<'a> {
+        self.many(self.keep, &clock.pace)
+    }
+
+    fn many(&self, part: f64, pace: &Pace) -> Many<'a> {
+        let sieve = match self.lenses {
+            [lens] => Sieve::new(lens, part * lens.tau, pace),
+            _ => None,
+        };
+        Many { judges: *self, part, pace: *pace, sieve }
+    }
+
     /// How urgent a split is that is needed: eight steps for each factor of two by which its error exceeds the tolerance.
     pub(crate) fn rank(&self, e: &Entry) -> u16 {
         let urgency = match self.lenses {
@@ -359,44 +398,73 @@ impl<'a> Judges<'a> {
             [lens] => lens.urgency_seen(e),
             lenses => lenses.iter().map(|l| l.urgency(e)).fold(0.0, f64::max),
         };
-        (urgency.max(1.0).log2() * 8.0).min(1e4) as u16
+        // The exponent and three bits of a single: steps within a factor of two are equally long.
+        ((urgency.clamp(1.0, 1e30) as f32).to_bits() >> 20) as u16 - (127 << 3)
+    }
+}
+
+/// Asks about many splits with one tolerance; the answers are those of [`Judges`].
+pub(super) struct Many<'a> {
+    judges: Judges<'a>,
+    part: f64,
+    pace: Pace,
+    sieve: Option<Sieve>,
+}
+
+impl Many<'_> {
+    /// Whether each is needed, or to be kept, and for how long that stands, appended to `out`.
+    pub(super) fn look(&self, entries: &[Entry], out: &mut Vec<Found>) {
+        match (&self.sieve, self.judges.lenses) {
+            (Some(sieve), [lens]) => sieve.look((lens, self.part * lens.tau, &self.pace), entries, out),
+            _ => out.extend(entries.iter().map(|e| Found::from(self.judges.of(e, self.part, &self.pace)))),
+        }
+    }
+
+    /// Whether each is needed, or to be kept, appended to `out`.
+    pub(super) fn wanted(&self, entries: &[Entry], out: &mut Vec<bool>) {
+        match (&self.sieve, self.judges.lenses) {
+            (Some(sieve), [lens]) => sieve.wanted(lens, self.part * lens.tau, entries, out),
+            (_, lenses) => {
+                out.extend(entries.iter().map(|e| lenses.iter().any(|l| l.wants(e, self.part * l.tau))));
+            }
+        }
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::hierarchy::{Cone, Direction, Packed};
     use crate::selective::Cull;
     use crate::view::{Camera, CameraParameters, NormalCone, Projection};
     use glam::{DMat4, DVec3};
 
-    struct Random(u64);
+    pub(in crate::selective) struct Random(pub(in crate::selective) u64);
 
     impl Random {
-        fn unit(&mut self) -> f64 {
+        pub(in crate::selective) fn unit(&mut self) -> f64 {
             self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (self.0 >> 33) as f64 / (1u64 << 31) as f64
         }
 
-        fn vector(&mut self) -> DVec3 {
+        pub(in crate::selective) fn vector(&mut self) -> DVec3 {
             DVec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
         }
     }
 
-    const DIAGONAL: f64 = 2.0;
+    pub(in crate::selective) const DIAGONAL: f64 = 2.0;
 
     /// A camera and a tolerance near another: the moves are about `step`.
-    struct Pose {
-        eye: DVec3,
-        look: DVec3,
-        up: DVec3,
-        tau: f64,
-        directional: bool,
+    pub(in crate::selective) struct Pose {
+        pub(in crate::selective) eye: DVec3,
+        pub(in crate::selective) look: DVec3,
+        pub(in crate::selective) up: DVec3,
+        pub(in crate::selective) tau: f64,
+        pub(in crate::selective) directional: bool,
     }
 
     impl Pose {
-        fn lens(&self, perspective: bool, cull: Cull) -> Lens {
+        pub(in crate::selective) fn lens(&self, perspective: bool, cull: Cull) -> Lens {
             let projection = if perspective {
                 Projection::Perspective { fov_y_deg: 50.0 }
             } else {
@@ -423,7 +491,7 @@ mod tests {
             }
         }
 
-        fn moved(&self, r: &mut Random, step: f64) -> Pose {
+        pub(in crate::selective) fn moved(&self, r: &mut Random, step: f64) -> Pose {
             // At times only a turn, only a step, or around the middle.
             let turn = glam::DQuat::from_scaled_axis(step * r.vector());
             let (eye, look, up) = match (r.unit() * 4.0) as u32 {
@@ -437,7 +505,7 @@ mod tests {
         }
     }
 
-    fn entry(r: &mut Random) -> Entry {
+    pub(in crate::selective) fn entry(r: &mut Random) -> Entry {
         let cone = if r.unit() < 0.2 { NormalCone::ALL } else { NormalCone::new(r.vector(), 1.2 * r.unit()) };
         let radius = DIAGONAL * 0.3 * r.unit().powi(4);
         let error = radius * 0.2 * r.unit().powi(3);

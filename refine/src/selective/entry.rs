@@ -16,7 +16,7 @@ pub(crate) struct Entry {
 
 impl Entry {
     pub(crate) fn of(h: &Hierarchy, i: u32) -> Entry {
-        Entry::new(i, h.local_centre(i), h.bounds.of[i as usize]).with_direction(h)
+        Entry::placed(h, i, h.local_centre(i))
     }
 
     /// Of the split of vertex `v` that comes after the first `k` of its chain, and is `i`.
@@ -28,7 +28,13 @@ impl Entry {
     /// Of split `i`, of a vertex that stands there.
     #[inline]
     pub(super) fn at(h: &Hierarchy, i: u32, place: glam::DVec3) -> Entry {
-        Entry::new(i, h.bounds.local(place), h.bounds.of[i as usize]).with_direction(h)
+        Entry::placed(h, i, h.bounds.local(place))
+    }
+
+    /// The same of a place about the origin of the bounds.
+    #[inline]
+    pub(super) fn placed(h: &Hierarchy, i: u32, at: Vec3) -> Entry {
+        Entry::new(i, at, h.bounds.of[i as usize]).with_direction(h)
     }
 
     /// Of a split at `centre`, about the origin of the bounds.

@@ -201,7 +201,12 @@ impl Front {
     /// How many splits of the chain of vertex `v` are applied: the first ones.
     #[inline]
     pub(crate) fn turns(&self, forest: &Forest, v: u32) -> usize {
-        let chain = forest.chain(v);
+        self.turns_of(forest.chain(v))
+    }
+
+    /// How many splits of a chain are applied.
+    #[inline]
+    pub(super) fn turns_of(&self, chain: &[u32]) -> usize {
         // Short chains from the front: few are longer, and those of the base.
         match chain.iter().take(SHORT).position(|&j| !self.is_applied(j)) {
             Some(k) => k,
@@ -237,14 +242,53 @@ impl Front {
         i: u32,
         note: Option<&mut Vec<[u32; 2]>>,
     ) -> Result<u32, Damage> {
+        self.split_at(pm, forest, (i, [NONE; 2]), note)
+    }
+
+    /// Where the cuts of split `i` lie, as `slot * 4 + edge`; [`NONE`] where the face is not there, or there is no cut.
+    #[inline]
+    pub(super) fn cuts(&self, pm: &ProgressiveMesh, forest: &Forest, i: u32) -> [u32; 2] {
+        let of = |cut: u32| match self.slot_of(forest, cut >> 2) {
+            NONE => NONE,
+            slot => slot << 2 | cut & 3,
+        };
+        [of(pm.splits.left[i as usize]), of(pm.splits.right[i as usize])]
+    }
+
+    /// Reads the faces of cuts and those across them.
+    #[inline]
+    pub(super) fn fetch(&self, cuts: [u32; 2]) -> u32 {
+        let link = |slot: u32, k: u32| self.fans.links.get(slot as usize).map_or(NONE, |l| l[k as usize]);
+        let corner = |slot: u32| self.fans.corners.get(slot as usize).map_or(0, |c| c[0]);
+        let mut sum = 0;
+        for cut in cuts {
+            let across = if cut == NONE { NONE } else { link(cut >> 2, cut & 3) } >> 3;
+            sum ^= corner(cut >> 2) ^ link(across, 0) ^ corner(across);
+        }
+        sum
+    }
+
+    /// As [`Front::split`], with what [`Front::cuts`] has found; what it has not is looked for again.
+    #[inline]
+    pub(super) fn split_at(
+        &mut self,
+        pm: &ProgressiveMesh,
+        forest: &Forest,
+        (i, found): (u32, [u32; 2]),
+        note: Option<&mut Vec<[u32; 2]>>,
+    ) -> Result<u32, Damage> {
         let k = i as usize;
         let (known, explicit) = known(pm, forest, i)?;
-        let here = |cut: u32| match self.slot_of(forest, cut >> 2) {
-            NONE => Err(Damage::Reference { what: "split", at: k, to: cut }),
-            slot => Ok(slot << 2 | cut & 3),
+        let here = |cut: u32, found: u32| match found {
+            NONE => match self.slot_of(forest, cut >> 2) {
+                NONE => Err(Damage::Reference { what: "split", at: k, to: cut }),
+                slot => Ok(slot << 2 | cut & 3),
+            },
+            found => Ok(found),
         };
         let two = known.code.two_faces();
-        let cuts = (here(pm.splits.left[k])?, if two { here(pm.splits.right[k])? } else { NONE });
+        let left = here(pm.splits.left[k], found[0])?;
+        let cuts = (left, if two { here(pm.splits.right[k], found[1])? } else { NONE });
         let [first, _] = patch::split(
             &mut Whole { front: self, pm, forest, note },
             &known,

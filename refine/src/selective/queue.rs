@@ -1,88 +1,47 @@
-//! Splits that are needed, while a frame applies them.
+//! Splits that are needed, while a frame applies them the most urgent first.
 
-/// In which order they are applied.
-pub(super) enum Queue {
-    /// The most urgent first: where a limit may leave some out.
-    Urgent {
-        /// By how urgent they are.
-        buckets: Vec<Vec<u32>>,
-        /// None above it holds any.
-        highest: usize,
-    },
-    /// As they are numbered: where all will be applied. What comes one after the other then lies close together in memory, and mostly what a split depends on has come before it.
-    Ascending {
-        /// A bit for each; empty before the first.
-        bits: Vec<u64>,
-        /// The words that can have any.
-        words: std::ops::Range<usize>,
-        splits: usize,
-    },
+use super::refine::Open;
+
+/// Buckets by how urgent they are.
+pub(super) struct Queue {
+    buckets: Vec<Vec<Open>>,
+    /// None above it holds any.
+    highest: usize,
+    len: usize,
 }
 
 const BUCKETS: usize = 256;
 
+impl Default for Queue {
+    fn default() -> Self {
+        Queue { buckets: vec![Vec::new(); BUCKETS], highest: 0, len: 0 }
+    }
+}
+
 impl Queue {
-    /// For a mesh of so many splits.
-    pub(super) fn new(by_urgency: bool, splits: usize) -> Queue {
-        if by_urgency {
-            Queue::Urgent { buckets: vec![Vec::new(); BUCKETS], highest: 0 }
-        } else {
-            Queue::Ascending { bits: Vec::new(), words: splits..0, splits }
-        }
+    /// Adds a split.
+    #[inline]
+    pub(super) fn push(&mut self, open: Open, rank: u16) {
+        let bucket = usize::from(rank).min(BUCKETS - 1);
+        self.highest = bucket.max(self.highest);
+        self.buckets[bucket].push(open);
+        self.len += 1;
     }
 
-    /// Adds split `i`, whose rank is asked for if it matters. Ascending ones must come after the one that was taken out last.
-    #[inline]
-    pub(super) fn push(&mut self, i: u32, rank: impl FnOnce() -> u16) {
-        match self {
-            Queue::Urgent { buckets, highest } => {
-                let bucket = usize::from(rank()).min(BUCKETS - 1);
-                *highest = bucket.max(*highest);
-                buckets[bucket].push(i);
-            }
-            Queue::Ascending { bits, words, splits } => {
-                if bits.is_empty() {
-                    *bits = vec![0; splits.div_ceil(64)];
-                }
-                let word = i as usize / 64;
-                bits[word] |= 1 << (i % 64);
-                *words = words.start.min(word)..words.end.max(word + 1);
-            }
+    /// Takes out the next, at most so many, all of one rank; none if there is none.
+    pub(super) fn pop(&mut self, most: usize, out: &mut Vec<Open>) {
+        while self.highest > 0 && self.buckets[self.highest].is_empty() {
+            self.highest -= 1;
         }
-    }
-
-    /// Takes out the next.
-    #[inline]
-    pub(super) fn pop(&mut self) -> Option<u32> {
-        match self {
-            Queue::Urgent { buckets, highest } => loop {
-                match buckets[*highest].pop() {
-                    None if *highest == 0 => return None,
-                    None => *highest -= 1,
-                    found => return found,
-                }
-            },
-            Queue::Ascending { bits, words, .. } => {
-                while words.start < words.end {
-                    let word = &mut bits[words.start];
-                    if *word != 0 {
-                        let i = 64 * words.start as u32 + word.trailing_zeros();
-                        *word &= *word - 1;
-                        return Some(i);
-                    }
-                    words.start += 1;
-                }
-                None
-            }
-        }
+        let bucket = &mut self.buckets[self.highest];
+        let from = bucket.len().saturating_sub(most);
+        self.len -= bucket.len() - from;
+        out.extend(bucket.drain(from..));
     }
 
     /// How many there are.
     pub(super) fn len(&self) -> usize {
-        match self {
-            Queue::Urgent { buckets, .. } => buckets.iter().map(Vec::len).sum(),
-            Queue::Ascending { bits, .. } => bits.iter().map(|w| w.count_ones() as usize).sum(),
-        }
+        self.len
     }
 }
 
@@ -91,23 +50,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ascending_ones_come_as_they_are_numbered() {
-        let mut q = Queue::new(false, 1000);
-        assert_eq!((q.pop(), q.len()), (None, 0));
-        [700, 3, 64, 3].into_iter().for_each(|i| q.push(i, || 0));
-        assert_eq!(q.len(), 3);
-        assert_eq!(q.pop(), Some(3));
-        q.push(5, || 0);
-        q.push(999, || 0);
-        assert_eq!(std::iter::from_fn(|| q.pop()).collect::<Vec<_>>(), [5, 64, 700, 999]);
-    }
-
-    #[test]
     fn urgent_ones_come_first() {
-        let mut q = Queue::new(true, 1000);
-        [(7, 3), (8, 900), (9, 0)].into_iter().for_each(|(i, rank)| q.push(i, || rank));
-        assert_eq!((q.pop(), q.len()), (Some(8), 2));
-        q.push(1, || 12);
-        assert_eq!(std::iter::from_fn(|| q.pop()).collect::<Vec<_>>(), [1, 7, 9]);
+        let mut q = Queue::default();
+        let open = |split| Open { split, vertex: 0, turn: 0, at: glam::Vec3::ZERO };
+        let pop = |q: &mut Queue, most| {
+            let mut out = Vec::new();
+            q.pop(most, &mut out);
+            out.iter().map(|o| o.split).collect::<Vec<_>>()
+        };
+        assert_eq!(pop(&mut q, 3), []);
+        [(7, 3), (8, 900), (9, 0), (6, 3), (5, 3)].into_iter().for_each(|(i, rank)| q.push(open(i), rank));
+        assert_eq!((pop(&mut q, 2), q.len()), (vec![8], 4));
+        q.push(open(1), 12);
+        assert_eq!((pop(&mut q, 2), pop(&mut q, 2), q.len()), (vec![1], vec![6, 5], 2));
+        assert_eq!((pop(&mut q, 2), pop(&mut q, 2), pop(&mut q, 2), q.len()), (vec![7], vec![9], vec![], 0));
     }
 }

@@ -3,7 +3,7 @@
 use super::cut::Cut;
 use super::entry::Entry;
 use super::motions::{Motions, Stage};
-use super::{Followed, Lens, View};
+use super::{Followed, Lens, Split, View};
 use glam::DVec3;
 use std::convert::Infallible;
 
@@ -138,7 +138,7 @@ impl Stage for Both<'_> {
     }
 
     fn draw(&mut self, i: u32) -> Result<(), Infallible> {
-        self.drawn.apply(i);
+        self.drawn.apply(&Split::new(i));
         Ok(())
     }
 
