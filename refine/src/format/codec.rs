@@ -28,6 +28,9 @@ use crate::progressive::{ProgressiveMesh, SplitCode};
 /// Levels above the least of the chunk that are told apart.
 const TOPS: usize = 12;
 
+/// After so many splits a reader looks whether there was enough to read.
+const CHECKED: usize = 16;
+
 /// Valences told apart.
 const VALENCES: usize = 10;
 
@@ -40,8 +43,8 @@ fn valence_class(n: usize) -> usize {
 struct Models {
     roots: Number,
     root: Number,
-    split: [[[Bit; 7]; VALENCES]; 5],
-    done: [[Bit; 7]; 3],
+    split: sweep::Split,
+    done: [[Bit; 8]; 3],
     code_same: Bit,
     rest_same: Bit,
     rest: Number,
@@ -78,12 +81,9 @@ struct Codec<'a> {
     extras: Extras,
     m: &'a mut Models,
     ring: Ring,
-    /// Of every edge of the ring where its other end is, seen from its vertex, and the square of its length.
-    around: Vec<[f64; 4]>,
-    /// The sum of the squares of the first of them.
-    squares: f64,
-    /// The vertices to be visited in this sweep, the next on top; those of the next sweep.
+    /// The vertices to be visited in this sweep, and the place of the next; those of the next sweep.
     pass: Vec<u32>,
+    at: usize,
     list: Vec<u32>,
     /// Something was split in this sweep.
     moved: bool,
@@ -93,8 +93,9 @@ struct Codec<'a> {
     preparing: bool,
     /// What is told of the last split's code, and whether it moved its vertex.
     last_code: (u32, bool),
-    /// The least and the largest level.
+    /// The least and the largest level, and classes above the least.
     levels: [u16; 2],
+    classes: usize,
     /// The next split.
     split: u32,
     singles: Singles<'a>,
@@ -113,15 +114,15 @@ impl<'a> Codec<'a> {
             extras: Extras::new(head, first.wedge),
             m,
             ring: Ring::default(),
-            around: Vec::new(),
-            squares: 0.0,
             pass: Vec::new(),
+            at: 0,
             list: Vec::new(),
             moved: true,
             to_come: Vec::new(),
             preparing: false,
             last_code: (0, false),
             levels: [0; 2],
+            classes: 0,
             split: first.split as u32,
             singles: Singles::new(head),
         }
@@ -165,7 +166,7 @@ impl<'a> Codec<'a> {
         }
         self.apply(v, &cuts, code, (place, level));
         if let Some(to) = moved {
-            self.walk.vertices[v as usize].place = to;
+            self.walk.move_to(v, to);
         }
         self.split += 1;
         let [.., attributes, faces] = c;
@@ -217,6 +218,7 @@ pub(super) fn write(
     let numbers = sources.as_deref();
     let vertex = |v: u32| numbers.map_or(v, |n| n.vertex(v));
     let of: Vec<u32> = pm.splits.vertex[range].iter().map(|&v| vertex(v)).collect();
+    codec.prepares(false);
     codec.levels(&mut streams[ERRORS], levels);
     codec.begin(&mut streams[CONNECTIVITY], &of, count)?;
     let mut source = Some(Source { pm, numbers, at: first });
@@ -277,18 +279,23 @@ pub(super) fn read(
     };
     // A split takes at least 18 bytes and a place, so this is no more than was announced for the arrays.
     let least = 18 + if head.double { 24 } else { 12 };
-    out.reserve(count.min(usize::try_from(raw / least).ok()?));
+    if count as u64 > raw / least {
+        return None;
+    }
+    out.reserve(count);
+    state.walk.reserve(count);
     let mut codec = Codec::new(head, state, at, alone);
     if alone {
         codec.context(&mut streams, &ProgressiveMesh::default(), None, stored)?;
     }
+    codec.prepares(false);
     codec.levels(&mut streams[ERRORS], [0; 2]);
     codec.begin(&mut streams[CONNECTIVITY], &[], count)?;
-    for _ in 0..count {
+    for k in 1..=count {
         codec.split(&mut streams, &mut None, &mut out)?;
-        if streams.iter().any(Coder::spent) || out.bytes() > raw {
+        if k % CHECKED == 0 && (streams.iter().any(Coder::spent) || out.bytes() > raw) {
             return None;
         }
     }
-    Some(out).filter(|o| o.bytes() == raw)
+    Some(out).filter(|o| o.bytes() == raw && !streams.iter().any(Coder::spent))
 }

@@ -38,7 +38,7 @@ pub(super) trait Coder {
     }
 
     /// Up to 64 plain bits.
-    #[inline]
+    #[inline(always)]
     fn plain64(&mut self, bits: u32, value: u64) -> u64 {
         if bits <= 32 {
             return self.plain(bits, value as u32) as u64;
@@ -185,11 +185,10 @@ pub(super) struct Decoder<'a> {
     state: u32,
     bytes: &'a [u8],
     at: usize,
-    window: u64,
-    filled: u32,
     plain: &'a [u8],
-    plain_at: usize,
-    /// Bits were missing.
+    /// The next plain bit.
+    bit: u64,
+    /// Decisions were missing.
     short: bool,
 }
 
@@ -198,8 +197,7 @@ impl<'a> Decoder<'a> {
     pub(super) fn new(mut stream: &'a [u8]) -> Option<Self> {
         let length = take_varint(&mut stream)?;
         let (bytes, plain) = stream.split_at_checked(usize::try_from(length).ok()?)?;
-        let mut d =
-            Decoder { state: LEAST, bytes, at: 0, window: 0, filled: 0, plain, plain_at: 0, short: false };
+        let mut d = Decoder { state: LEAST, bytes, at: 0, plain, bit: 0, short: false };
         if !bytes.is_empty() {
             let high = d.word();
             d.state = (high << 16 | d.word()).max(LEAST);
@@ -220,21 +218,12 @@ impl<'a> Decoder<'a> {
         word
     }
 
-    /// Four more bytes of plain bits, of which `bits` are wanted.
-    fn refill(&mut self, bits: u32) {
-        let next = match self.plain.get(self.plain_at..self.plain_at + 4) {
-            Some(b) => [b[0], b[1], b[2], b[3]],
-            None => {
-                let rest = self.plain.get(self.plain_at..).unwrap_or_default();
-                self.short |= (rest.len() as u32) * 8 + self.filled < bits;
-                let mut four = [0; 4];
-                four[..rest.len()].copy_from_slice(rest);
-                four
-            }
-        };
-        self.plain_at += 4;
-        self.window |= (u32::from_le_bytes(next) as u64) << self.filled;
-        self.filled += 32;
+    /// The 8 bytes with the next plain bit, or what is left of them, and zeros.
+    #[cold]
+    fn tail(&self) -> u64 {
+        let at = usize::try_from(self.bit >> 3).unwrap_or(usize::MAX);
+        let rest = self.plain.get(at..).unwrap_or_default();
+        rest.iter().take(8).rev().fold(0, |x, &b| x << 8 | b as u64)
     }
 
     /// Takes a decision's share out of the state.
@@ -269,18 +258,19 @@ impl Coder for Decoder<'_> {
 
     #[inline(always)]
     fn plain(&mut self, bits: u32, _: u32) -> u32 {
-        if self.filled < bits {
-            self.refill(bits);
-        }
-        let value = (self.window & low_mask(bits)) as u32;
-        self.window >>= bits;
-        self.filled -= bits;
-        value
+        let at = (self.bit >> 3) as usize;
+        let next = match self.plain.get(at..at.saturating_add(8)) {
+            Some(b) => u64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]),
+            None => self.tail(),
+        };
+        let value = next >> (self.bit & 7) & low_mask(bits);
+        self.bit += bits as u64;
+        value as u32
     }
 
     #[inline]
     fn spent(&self) -> bool {
-        self.short
+        self.short || self.bit > 8 * self.plain.len() as u64
     }
 }
 

@@ -317,8 +317,8 @@ fn ranks(pm: &ProgressiveMesh, base: &[u32]) -> Vec<u32> {
 /// The place of a vertex in the order of descent, as far as its own ancestors tell: so chunks that know only some vertices agree about them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Label {
-    at: u64,
-    splits: u8,
+    pub(super) at: u64,
+    pub(super) splits: u8,
 }
 
 impl Label {

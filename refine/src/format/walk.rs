@@ -9,16 +9,18 @@ use crate::aif::NONE;
 use crate::progressive::links::link_faces;
 use crate::progressive::{ProgressiveMesh, SplitCode};
 
-/// A face: corners (vertices) in 0..3, links in 4..7; half a cache line.
-type Face = [u32; 8];
+/// A face: corners (vertices), then links.
+type Face = [u32; 6];
 
 /// By the low bits of a half: those of the face's other edge at the vertex, the corner at the vertex, that at the edge's other end.
-const TURN: [u32; 8] = [3, 4, 5, 0, 1, 2, 0, 0];
+const TURN: [u32; 8] = [3, 4, 5, 0, 1, 2, 6, 7];
 const NEAR: [u8; 8] = [1, 0, 2, 1, 0, 2, 0, 0];
 const FAR: [u8; 8] = [0, 1, 1, 2, 2, 0, 0, 0];
+/// Where in the face the link of the half stands.
+const LINK: [u8; 8] = [3, 3, 4, 4, 5, 5, 5, 5];
 
-/// The face's other edge at the vertex.
-#[inline]
+/// The face's other edge at the vertex; [`NONE`] of [`NONE`].
+#[inline(always)]
 pub(super) fn turn(h: u32) -> u32 {
     h & !7 | TURN[(h & 7) as usize]
 }
@@ -37,9 +39,14 @@ pub(super) const NO_LEVEL: u16 = u16::MAX;
 
 /// What is known of a vertex: half a cache line.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
 pub(super) struct Vertex {
-    /// Where it is.
-    pub(super) place: [f64; 3],
+    /// Its place in the order of descent.
+    label: u64,
+    /// Where it is; in double precision seen from the origin.
+    place: [f32; 3],
+    /// How often its place in the order of descent was halved.
+    halvings: u8,
     /// The half with which its ring begins; [`NONE`] for a vertex without faces.
     at: u32,
     /// The level of the last error of a split of it, or of that which made it.
@@ -55,21 +62,46 @@ pub(super) struct Vertex {
 pub(super) struct Walk {
     faces: Vec<Face>,
     pub(super) vertices: Vec<Vertex>,
-    /// The place of each vertex in the order of descent.
-    labels: Vec<Label>,
+    /// Places in double precision, if the mesh has that.
+    exact: Option<Vec<[f64; 3]>>,
+    /// What places are seen from: the first vertex of the base in double precision, else 0.
+    origin: [f64; 3],
     /// Faces and vertices of the base.
     base: (usize, usize),
     /// Those that are no longer as in the base, perhaps several times.
     changed: (Vec<u32>, Vec<u32>),
 }
 
+/// An edge of a ring, and what lies at its other end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Edge {
+    /// Where the other end is, seen from the vertex, and the square of its distance.
+    pub(super) to: [f32; 4],
+    /// The half by which the face behind the edge is entered; of an open ring the last has none.
+    half: u32,
+    /// The vertex at the other end.
+    far: u32,
+}
+
+impl Edge {
+    const NOWHERE: Edge = Edge { to: [0.0; 4], half: NONE, far: NONE };
+}
+
 /// The edges around a vertex, in turn.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Ring {
-    /// Each as the half by which the face behind it is entered, and the vertex at its other end. Of an open ring the last has no face behind it. There may be more room than edges.
-    room: Vec<(u32, u32)>,
+    /// The edges; behind them the first again, or, if the ring is open, one that leads nowhere. There may be more room.
+    room: Vec<Edge>,
     edges: usize,
     pub(super) closed: bool,
+    /// The squares of all lengths, summed up in turn.
+    pub(super) squares: f32,
+}
+
+impl Default for Ring {
+    fn default() -> Self {
+        Ring { room: vec![Edge::NOWHERE; ROOM], edges: 0, closed: false, squares: 0.0 }
+    }
 }
 
 /// Edges that there is room for at first.
@@ -98,8 +130,14 @@ impl Ring {
         self.edges
     }
 
-    #[inline]
-    fn all(&self) -> &[(u32, u32)] {
+    /// All of them, and what stands behind them.
+    #[inline(always)]
+    pub(super) fn and_next(&self) -> &[Edge] {
+        self.room.get(..self.edges + 1).unwrap_or_default()
+    }
+
+    #[inline(always)]
+    pub(super) fn all(&self) -> &[Edge] {
         self.room.get(..self.edges).unwrap_or_default()
     }
 
@@ -110,55 +148,51 @@ impl Ring {
     }
 
     /// Edge `k` as a left cut: the face behind it goes to the new vertex.
-    #[inline]
+    #[inline(always)]
     pub(super) fn left(&self, k: usize) -> Cut {
-        let all = self.all();
-        let before = match k {
-            0 if self.closed => all.last().map_or(NONE, |e| turn(e.0)),
-            0 => NONE,
-            _ => turn(all[k - 1].0),
-        };
-        Cut { inner: all[k].0, outer: before }
+        // Before the first of an open ring stands the last, which has no half.
+        let before = if k == 0 { self.edges } else { k } - 1;
+        Cut { inner: self.room[k].half, outer: turn(self.room[before].half) }
     }
 
     /// The edge `count` faces behind edge `k`, as a right cut.
-    #[inline]
+    #[inline(always)]
     pub(super) fn right(&self, k: usize, count: usize) -> Cut {
         let c = self.left(self.around(k + count));
         Cut { inner: c.outer, outer: c.inner }
     }
 
     /// The vertex at the other end of edge `k`, which may be counted once around.
-    #[inline]
+    #[inline(always)]
     pub(super) fn far(&self, k: usize) -> u32 {
-        self.all()[self.around(k)].1
-    }
-
-    /// The vertices at the other ends of all edges.
-    #[inline]
-    pub(super) fn fars(&self) -> impl ExactSizeIterator<Item = u32> + '_ {
-        self.all().iter().map(|e| e.1)
+        self.room[self.around(k)].far
     }
 
     /// The edge whose cut is named by half `h`, of a face that is entered by the edge (`entered`) or left by it.
     #[inline]
     pub(super) fn position(&self, h: u32, entered: bool) -> Option<usize> {
         let entry = if entered { h } else { turn(h) };
-        let k = self.all().iter().position(|e| e.0 == entry)? + !entered as usize;
+        let k = self.all().iter().position(|e| e.half == entry)? + !entered as usize;
         Some(if k == self.edges { 0 } else { k })
     }
 
     /// The half by which the ring enters a face.
     #[inline]
     pub(super) fn entry(&self, face: u32) -> Option<u32> {
-        self.all().iter().map(|e| e.0).find(|&h| h >> 3 == face && h != NONE)
+        self.all().iter().map(|e| e.half).find(|&h| h >> 3 == face && h != NONE)
     }
 
     /// Edge `k` counted once around.
-    #[inline]
+    #[inline(always)]
     pub(super) fn around(&self, k: usize) -> usize {
         if k >= self.edges { k - self.edges } else { k }
     }
+}
+
+/// A place seen from another.
+#[inline(always)]
+fn seen_from(origin: &[f64; 3], p: [f64; 3]) -> [f32; 3] {
+    [(p[0] - origin[0]) as f32, (p[1] - origin[1]) as f32, (p[2] - origin[2]) as f32]
 }
 
 impl Walk {
@@ -177,8 +211,13 @@ impl Walk {
         }
         let links = link_faces(&corners, n0);
         let labels = plan::labels(&plan::base_order(pm));
+        let double = pm.base_positions.is_f64();
+        let origin = if double && n0 > 0 { places::point(&pm.base_positions, 0) } else { [0.0; 3] };
+        let exact = double.then(|| (0..n0).map(|i| places::point(&pm.base_positions, i)).collect());
         let lone = |i: usize| Vertex {
-            place: places::point(&pm.base_positions, i),
+            label: labels[i].at,
+            halvings: labels[i].splits,
+            place: seen_from(&origin, places::point(&pm.base_positions, i)),
             at: NONE,
             level: NO_LEVEL,
             valence: 0,
@@ -198,11 +237,12 @@ impl Walk {
         // Cursors keep links as `face << 3 | same << 2 | edge`.
         let pack = |l: u32| if l == NONE { NONE } else { l & !7 | (l & 3) << 1 | !l >> 2 & 1 };
         Some(Walk {
-            faces: faces.map(|(c, l)| [c[0], c[1], c[2], 0, pack(l[0]), pack(l[1]), pack(l[2]), 0]).collect(),
+            faces: faces.map(|(c, l)| [c[0], c[1], c[2], pack(l[0]), pack(l[1]), pack(l[2])]).collect(),
             base: (corners.len(), vertices.len()),
             changed: Default::default(),
             vertices,
-            labels,
+            exact,
+            origin,
         })
     }
 
@@ -210,21 +250,49 @@ impl Walk {
     pub(super) fn reset(&mut self, base: &Walk) {
         self.faces.truncate(self.base.0);
         self.vertices.truncate(self.base.1);
-        self.labels.truncate(self.base.1);
+        if let Some(exact) = &mut self.exact {
+            exact.truncate(self.base.1);
+        }
         let (faces, vertices) = &mut self.changed;
         for f in faces.drain(..) {
             self.faces[f as usize] = base.faces[f as usize];
         }
         for v in vertices.drain(..) {
             self.vertices[v as usize] = base.vertices[v as usize];
-            self.labels[v as usize] = base.labels[v as usize];
+            if let (Some(exact), Some(base)) = (&mut self.exact, &base.exact) {
+                exact[v as usize] = base[v as usize];
+            }
         }
     }
 
     /// Where vertex `v` is in the order of descent.
     #[inline]
     pub(super) fn label(&self, v: u32) -> Label {
-        self.labels[v as usize]
+        let vertex = &self.vertices[v as usize];
+        Label { at: vertex.label, splits: vertex.halvings }
+    }
+
+    /// Where vertex `v` is.
+    #[inline(always)]
+    pub(super) fn place(&self, v: u32) -> [f64; 3] {
+        match &self.exact {
+            Some(exact) => exact[v as usize],
+            None => self.vertices[v as usize].place.map(f64::from),
+        }
+    }
+
+    /// Moves vertex `v`.
+    pub(super) fn move_to(&mut self, v: u32, place: [f64; 3]) {
+        self.vertices[v as usize].place = seen_from(&self.origin, place);
+        if let Some(exact) = &mut self.exact {
+            exact[v as usize] = place;
+        }
+    }
+
+    /// Room for so many more splits.
+    pub(super) fn reserve(&mut self, splits: usize) {
+        self.vertices.reserve(splits);
+        self.faces.reserve(2 * splits);
     }
 
     /// Notes that vertex `v` is about to change.
@@ -246,7 +314,7 @@ impl Walk {
     /// The same edge in the face across.
     #[inline]
     pub(super) fn across(&self, h: u32) -> u32 {
-        let link = self.faces[(h >> 3) as usize][4 + (h >> 1 & 3) as usize];
+        let link = self.faces[(h >> 3) as usize][LINK[h as usize & 7] as usize];
         if link == NONE { NONE } else { link ^ h & 1 }
     }
 
@@ -269,51 +337,74 @@ impl Walk {
         self.vertices[v as usize].at
     }
 
-    /// The ring from `start` on; from the border on if there is one. `None` for links that lead astray, as only damage makes them.
+    /// The half, and the other end seen from `t`.
+    #[inline(always)]
+    fn edge(&self, half: u32, far: u32, t: &[f32; 3]) -> Edge {
+        let p = &self.vertices[far as usize].place;
+        let [x, y, z] = [p[0] - t[0], p[1] - t[1], p[2] - t[2]];
+        Edge { to: [x, y, z, x * x + y * y + z * z], half, far }
+    }
+
+    /// The ring of `v` from `start` on; from the border on if there is one. `None` for links that lead astray, as only damage makes them.
     #[inline]
-    pub(super) fn ring(&self, start: u32, ring: &mut Ring) -> Option<()> {
-        let most = self.faces.len();
-        let (faces, mut entry, mut n) = (&self.faces[..], start, 0);
+    pub(super) fn ring(&self, v: u32, start: u32, ring: &mut Ring) -> Option<()> {
+        let t = self.vertices[v as usize].place;
+        let (faces, mut entry, mut n, mut squares) = (&self.faces[..], start, 0, 0.0);
         let exit = loop {
             let face = &faces[(entry >> 3) as usize];
             let low = (entry & 7) as usize;
-            let edge = (entry, face[FAR[low] as usize & 3]);
+            let edge = self.edge(entry, face[FAR[low] as usize & 3], &t);
+            squares += edge.to[3];
             match ring.room.get_mut(n) {
                 Some(room) => *room = edge,
-                None if n > most => return None,
-                None => ring.room.resize(2 * n.max(ROOM), edge),
+                None if n > self.faces.len() => return None,
+                None => ring.room.resize(2 * n, edge),
             }
             n += 1;
             let exit = TURN[low];
-            let link = face[4 + (exit >> 1 & 3) as usize];
+            let link = face[LINK[exit as usize & 7] as usize];
             if link == NONE {
                 break turn(entry);
             }
             entry = link ^ exit & 1;
             if entry == start {
-                (ring.closed, ring.edges) = (true, n);
+                let first = ring.room[0];
+                match ring.room.get_mut(n) {
+                    Some(room) => *room = first,
+                    None => ring.room.push(first),
+                }
+                (ring.closed, ring.edges, ring.squares) = (true, n, squares);
                 return Some(());
             }
         };
-        ring.closed = false;
-        ring.room.truncate(n);
-        ring.room.push((NONE, self.far(exit)));
-        let (n, mut before) = (ring.room.len(), start);
+        self.open(start, (exit, n), &t, ring)
+    }
+
+    /// The ring goes no further than `exit`, behind `n` edges: the last edge, and those before the first.
+    #[cold]
+    fn open(&self, start: u32, (exit, n): (u32, usize), t: &[f32; 3], ring: &mut Ring) -> Option<()> {
+        let room = &mut ring.room;
+        room.truncate(n);
+        room.push(self.edge(NONE, self.far(exit), t));
+        let (n, mut before) = (room.len(), start);
         loop {
             let exit = self.across(before);
             if exit == NONE {
                 break;
             }
-            if ring.room.len() > 2 * most + 1 {
+            if room.len() > 2 * self.faces.len() + 1 {
                 return None;
             }
             before = turn(exit);
-            ring.room.push((before, self.far(before)));
+            room.push(self.edge(before, self.far(before), t));
         }
-        let back = ring.room.len() - n;
-        ring.room[n..].reverse();
-        ring.room.rotate_right(back);
-        ring.edges = ring.room.len();
+        let back = room.len() - n;
+        room[n..].reverse();
+        room.rotate_right(back);
+        ring.squares = 0.0;
+        room.iter().for_each(|e| ring.squares += e.to[3]);
+        (ring.closed, ring.edges) = (false, room.len());
+        room.push(Edge::NOWHERE);
         Some(())
     }
 
@@ -331,12 +422,14 @@ impl Walk {
         let two = code.two_faces();
         let (left, right) = (ring.left(first), ring.right(first, count));
         let tips = [ring.far(first), if two { ring.far(first + count) } else { NONE }];
-        for k in first..first + count {
-            let entry = ring.all()[ring.around(k)].0;
+        let mut k = first;
+        for _ in 0..count {
+            let entry = ring.room[k].half;
             if entry == NONE {
                 break;
             }
             self.face_mut(entry >> 3)[NEAR[(entry & 7) as usize] as usize & 3] = u;
+            k = ring.around(k + 1);
         }
         let (l, old, mut at_u) = self.insert(code.left().1, [v, u, tips[0]], left);
         if two {
@@ -354,9 +447,15 @@ impl Walk {
         (vertex.at, vertex.level) = (old, level);
         let kept = vertex.valence.saturating_add(1 + two as u8);
         vertex.valence = kept.saturating_sub(count.min(255) as u8);
-        self.vertices.push(Vertex { place, at: at_u, level, valence, visit: 0 });
-        let label = self.labels[v as usize].split();
-        self.labels.push(label);
+        let mut label = Label { at: vertex.label, splits: vertex.halvings };
+        let new = label.split();
+        vertex.halvings = label.splits;
+        if let Some(exact) = &mut self.exact {
+            exact.push(place);
+        }
+        let place = seen_from(&self.origin, place);
+        let (label, halvings) = (new.at, new.splits);
+        self.vertices.push(Vertex { label, halvings, place, at: at_u, level, valence, visit: 0 });
         for tip in tips {
             self.changes(tip);
             if let Some(t) = self.vertices.get_mut(tip as usize) {
@@ -379,7 +478,7 @@ impl Walk {
         let (to_after, to_before) = if new_next { (at.inner, at.outer) } else { (at.outer, at.inner) };
         // Seen from where the face ends the edge.
         let link = |to: u32, from: u32| if to == NONE { NONE } else { to ^ from & 1 };
-        self.faces.push([tip, b, c, 0, link(to_after, after), NONE, link(to_before, before), 0]);
+        self.faces.push([tip, b, c, link(to_after, after), NONE, link(to_before, before)]);
         if at.outer != NONE {
             self.link(at.outer, old);
         }
@@ -392,7 +491,7 @@ impl Walk {
     /// Links half `x` to `y`, both seen from the same vertex.
     #[inline]
     fn link(&mut self, x: u32, y: u32) {
-        self.face_mut(x >> 3)[4 + (x >> 1 & 3) as usize] = y ^ x & 1;
+        self.face_mut(x >> 3)[LINK[x as usize & 7] as usize] = y ^ x & 1;
     }
 }
 

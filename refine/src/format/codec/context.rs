@@ -11,7 +11,7 @@ use super::super::residual::Guess;
 use super::super::splits::{CONNECTIVITY, Counts, PLACES, STREAMS};
 use super::super::walk::{NO_LEVEL, Walk};
 use super::cuts::Wanted;
-use super::{Codec, Sequel};
+use super::{CHECKED, Codec, Sequel};
 use crate::aif::NONE;
 use crate::progressive::ProgressiveMesh;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -271,7 +271,7 @@ impl Codec<'_> {
             }
             parts.extend(Some(rest).filter(|p| !p.is_empty()));
         }
-        self.preparing = true;
+        self.prepares(true);
         let number = c[CONNECTIVITY].number(&mut self.m.context.sources, parts.len() as u64);
         let (mut next, mut near) = (0u32, false);
         let mut of = Vec::new();
@@ -312,22 +312,25 @@ impl Codec<'_> {
                 if two {
                     known.of_face.push(face + 1);
                 }
-                if c.iter().any(Coder::spent) {
+                if known.ids.len() % CHECKED == 0 && c.iter().any(Coder::spent) {
                     return None;
                 }
             }
         }
-        self.preparing = false;
+        if c.iter().any(Coder::spent) {
+            return None;
+        }
+        self.prepares(false);
         self.known = Some(known);
         Some(())
     }
 
     /// A place, in steps that go with its surroundings.
     fn roughly<C: Coder>(&mut self, c: &mut C, guess: &Guess, place: [f64; 3]) -> [f64; 3] {
-        let octave = |x: f64| (x.to_bits() >> 52) as i32 - 1023;
+        let octave = |x: f32| (x.to_bits() >> 23) as i32 - 127;
         let power = |e: i32| f64::from_bits(((e + 1023) as u64) << 52);
         let longest = octave(guess.reach[0].max(guess.reach[1]).max(guess.reach[2]));
-        if !(-900..900).contains(&longest) {
+        if !(-126..128).contains(&longest) {
             // All in one place, or nowhere.
             return guess.at;
         }
@@ -339,11 +342,9 @@ impl Codec<'_> {
             out[axis] += self.steps(c, (0, flat), steps) * power(longest - ACROSS);
         }
         let flat = longest - octave(guess.rise);
-        let off = guess.off([place[0] - guess.at[0], place[1] - guess.at[1], place[2] - guess.at[2]]);
+        let off = guess.off(std::array::from_fn(|k| (place[k] - guess.at[k]) as f32)) as f64;
         let steps = self.steps(c, (1, flat), off * power(ALONG - longest)) * power(longest - ALONG);
-        out[last] -= guess.slope[a] * (out[a] - guess.at[a]);
-        out[last] -= guess.slope[b] * (out[b] - guess.at[b]);
-        out[last] += steps;
+        out[last] = guess.on_plane(&out) + steps;
         out
     }
 

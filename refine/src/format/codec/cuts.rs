@@ -22,8 +22,6 @@ const RIGHT: usize = 8;
 const DONE: usize = 4;
 /// Which of an edge, the one before and the one behind are long.
 const SHAPES: usize = 8;
-/// Edges of a ring whose lengths count.
-const SEEN: usize = 60;
 
 /// Whether an edge is the left cut: by what the sweep did with the vertex, edges to come, lengths.
 pub(super) type Left = [[[Bit; SHAPES]; LEFT]; 3];
@@ -58,7 +56,7 @@ impl Codec<'_> {
         wanted: Option<Wanted>,
     ) -> Option<(SplitCode, Cuts)> {
         let start = Some(self.walk.start(v)).filter(|&h| h != NONE)?;
-        self.walk.ring(start, &mut self.ring)?;
+        self.walk.ring(v, start, &mut self.ring)?;
         let mut want = None;
         let (mut rest, mut moves) = (0, false);
         let told = if self.preparing { !ARRANGEMENT } else { TOLD };
@@ -66,7 +64,7 @@ impl Codec<'_> {
             (rest, moves) = ((w.code.0 & !told) as u32, !self.preparing && w.code.moves());
             want = self.find(two, w);
             if want.is_none() {
-                self.walk.ring(turn(start), &mut self.ring)?;
+                self.walk.ring(v, turn(start), &mut self.ring)?;
                 want = self.find(two, w);
                 rest |= if want.is_some() { TURNED } else { NAMED };
             }
@@ -93,9 +91,9 @@ impl Codec<'_> {
             self.named(c, v, two, wanted)?
         } else {
             if C::READS && rest & TURNED != 0 {
-                self.walk.ring(turn(start), &mut self.ring)?;
+                self.walk.ring(v, turn(start), &mut self.ring)?;
             }
-            self.counted(c, (v, state), two, want)?
+            self.counted(c, state, two, want)?
         };
         let (left, inner) = cuts.left.name();
         if left == NONE {
@@ -140,40 +138,46 @@ impl Codec<'_> {
     fn counted<C: Coder>(
         &mut self,
         c: &mut C,
-        (v, state): (u32, u8),
+        state: u8,
         two: bool,
         want: Option<(usize, usize)>,
     ) -> Option<Cuts> {
-        self.survey(v);
         let ring = &self.ring;
-        let (faces, n) = (ring.faces(), ring.edges());
-        let long = self.long();
+        let (faces, n, room) = (ring.faces(), ring.edges(), ring.and_next());
+        let mean = ring.squares / n as f32;
+        let long = |k: usize| (room[k].to[3] > mean) as usize;
         let (left, right) = want.unwrap_or_default();
-        // The edge before, edge `k`, the edge behind.
-        let shape = |k: usize| if k < SEEN { (long >> k & 7) as usize } else { 0 };
         // With one face the whole fan may stay.
         let edges = if two { faces } else { n };
         let models = &mut self.m.left[state.min(2) as usize];
+        // Whether the edge before and edge `first` are long; the edge behind comes above them.
+        let mut shape = (ring.closed as usize & long(n - 1)) | long(0) << 1;
         let mut first = 0;
         while first + 1 < edges {
-            let model = &mut models[(edges - first - 2).min(LEFT - 1)][shape(first)];
+            shape |= long(first + 1) << 2;
+            let model = &mut models[(edges - first - 2).min(LEFT - 1)][shape & 7];
             if c.bit(model, first == left) {
                 break;
             }
             first += 1;
+            shape >>= 1;
         }
         let mut count = faces - first;
         if two {
             let most = if ring.closed { faces.checked_sub(1)? } else { count };
             count = 1;
+            let mut at = ring.around(first + 1);
+            shape = long(first) | long(at) << 1;
             while count < most {
-                let at = if first + count < n { first + count } else { first + count - n };
+                shape |= long(at + 1) << 2;
                 let models = &mut self.m.right[(count - 1).min(DONE - 1)];
-                let model = &mut models[(most - count - 1).min(RIGHT - 1)][shape(at)];
+                let model = &mut models[(most - count - 1).min(RIGHT - 1)][shape & 7];
                 if c.bit(model, count == right) {
                     break;
                 }
                 count += 1;
+                at = ring.around(at + 1);
+                shape >>= 1;
             }
             if count > most {
                 return None;
@@ -182,46 +186,6 @@ impl Codec<'_> {
             return None;
         }
         Some(Cuts { left: ring.left(first), right: ring.right(first, count), first, count })
-    }
-
-    /// Which edges of the ring are longer than most: of edge k bit k + 1. Before the first of a closed ring comes the last, behind the last the first.
-    #[inline]
-    fn long(&self) -> u64 {
-        let ring = &self.ring;
-        let edges = ring.edges();
-        let n = edges.min(SEEN);
-        let mean = self.squares / n as f64;
-        // Bit by bit from above, and down at last.
-        let mut long = 0u64;
-        for d in self.around.iter().take(SEEN) {
-            long = long >> 1 | ((d[3] > mean) as u64) << 63;
-        }
-        long >>= (63 - n) & 63;
-        if ring.closed && edges == n {
-            long |= long >> n & 1 | (long >> 1 & 1) << (n + 1);
-        }
-        long
-    }
-
-    /// Measures what lies around vertex `v`, whose ring is at hand: of every edge where its other end is, seen from `v`, and the square of its length.
-    #[inline]
-    pub(super) fn survey(&mut self, v: u32) {
-        let vertices = &self.walk.vertices[..];
-        let t = vertices[v as usize].place;
-        self.around.resize(self.ring.edges(), [0.0; 4]);
-        let mut squares = 0.0;
-        for (to, far) in self.around.iter_mut().zip(self.ring.fars()) {
-            let p = vertices[far as usize].place;
-            let d = [p[0] - t[0], p[1] - t[1], p[2] - t[2]];
-            let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-            squares += square;
-            *to = [d[0], d[1], d[2], square];
-        }
-        if self.around.len() > SEEN {
-            squares = 0.0;
-            self.around[..SEEN].iter().for_each(|d| squares += d[3]);
-        }
-        self.squares = squares;
     }
 
     /// Cuts by the numbers of faces: where the vertex has several fans, or the cuts are not named by the later face.
@@ -236,7 +200,7 @@ impl Codec<'_> {
         } else {
             Some(self.walk.across(half)).filter(|&h| h != NONE).unwrap_or(turn(half))
         };
-        self.walk.ring(begin, &mut self.ring)?;
+        self.walk.ring(v, begin, &mut self.ring)?;
         if two {
             right = u32::try_from(c.number(&mut self.m.named[1], right as u64)).ok()?;
             if c.bit(&mut self.m.inner[2], code.right_inner()) {
@@ -252,7 +216,6 @@ impl Codec<'_> {
                 | flags(starts, SplitCode::L_STARTS),
         );
         let (first, count) = self.find(two, Wanted { vertex: v, left, right, code })?;
-        self.survey(v);
         Some(Cuts { left: self.ring.left(first), right: self.ring.right(first, count), first, count })
     }
 }

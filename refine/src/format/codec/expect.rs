@@ -8,54 +8,47 @@ impl Codec<'_> {
     /// Where the new vertex of a split is expected.
     #[inline]
     pub(super) fn guess(&self, v: u32, cuts: &Cuts, moves: bool) -> Guess {
-        let t = self.walk.vertices[v as usize].place;
-        let (mut sum, mut reach, mut normal) = ([0.0; 3], [0.0f64; 3], [0.0; 3]);
-        let mut last = [0.0; 3];
-        let between = self.between(cuts);
-        for part in between {
-            for &[x, y, z, _] in part {
-                let d = [x, y, z];
-                for a in 0..3 {
-                    sum[a] += d[a];
-                    reach[a] = greater(d[a].abs(), reach[a]);
-                }
-                normal[0] += last[1] * z - last[2] * y;
-                normal[1] += last[2] * x - last[0] * z;
-                normal[2] += last[0] * y - last[1] * x;
-                last = d;
+        let t = self.walk.place(v);
+        let (ring, room) = (&self.ring, self.ring.all());
+        let (mut sum, mut reach, mut normal) = ([0.0f32; 4], [0.0f32; 4], [0.0f32; 3]);
+        let mut last = [0.0f32; 4];
+        let mut k = cuts.first;
+        for _ in 0..=cuts.count {
+            let d = room[k].to;
+            for a in 0..4 {
+                sum[a] += d[a];
+                reach[a] = greater(d[a].abs(), reach[a]);
             }
+            normal[0] += last[1] * d[2] - last[2] * d[1];
+            normal[1] += last[2] * d[0] - last[0] * d[2];
+            normal[2] += last[0] * d[1] - last[1] * d[0];
+            last = d;
+            k = ring.around(k + 1);
         }
-        let n = (cuts.count + 1) as f64;
+        let n = (cuts.count + 1) as f32;
         // Where both are placed anew the old place is between them: fitted to bunny, horse and igea.
         let share = if moves { 0.375 / n } else { 1.0 / (n + 1.0) };
         let go = [sum[0] * share, sum[1] * share, sum[2] * share];
-        let mut guess = Guess { at: [t[0] + go[0], t[1] + go[1], t[2] + go[2]], reach, ..Guess::default() };
+        let at = std::array::from_fn(|a| t[a] + go[a] as f64);
+        let mut guess = Guess { at, reach: [reach[0], reach[1], reach[2]], ..Guess::default() };
         guess.lay(normal);
         let level = guess.off(go);
+        // Both ends and one between.
         let mut rise = level.abs();
-        for part in between {
-            for &[x, y, z, _] in part {
-                rise = greater((guess.off([x, y, z]) - level).abs(), rise);
-            }
+        for k in [cuts.first, ring.around(cuts.first + cuts.count / 2)] {
+            let [x, y, z, _] = room[k].to;
+            rise = greater((guess.off([x, y, z]) - level).abs(), rise);
         }
+        rise = greater((guess.off([last[0], last[1], last[2]]) - level).abs(), rise);
         guess.rise = rise;
         guess
     }
 
-    /// What lies around the old vertex, from cut to cut: in two parts, as it may go on behind the ring's last edge.
-    #[inline]
-    fn between(&self, cuts: &Cuts) -> [&[[f64; 4]]; 2] {
-        let all = &self.around[..];
-        let end = cuts.first + cuts.count + 1;
-        let over = end.saturating_sub(all.len());
-        [all.get(cuts.first..end - over).unwrap_or_default(), all.get(..over).unwrap_or_default()]
-    }
-
     /// Where the old vertex of a split is expected to go: it stays near, drawn to the neighbours that it keeps.
     pub(super) fn guess_moved(&self, v: u32, cuts: &Cuts, guess: &Guess) -> Guess {
-        let (ring, vertices) = (&self.ring, &self.walk.vertices[..]);
-        let t = vertices[v as usize].place;
-        let [l, r] = [cuts.first, cuts.first + cuts.count].map(|k| vertices[ring.far(k) as usize].place);
+        let ring = &self.ring;
+        let t = self.walk.place(v);
+        let [l, r] = [cuts.first, cuts.first + cuts.count].map(|k| self.walk.place(ring.far(k)));
         let edges = ring.edges();
         let kept = if ring.closed { edges.saturating_sub(cuts.count + 1) } else { 0 };
         let mut sum = [0.0; 3];
@@ -64,7 +57,7 @@ impl Codec<'_> {
             if at >= 2 * edges {
                 at -= edges;
             }
-            let p = vertices[ring.far(at) as usize].place;
+            let p = self.walk.place(ring.far(at));
             for a in 0..3 {
                 sum[a] += p[a];
             }
@@ -81,6 +74,6 @@ impl Codec<'_> {
 
 /// The greater of both; `y` where `x` is no number.
 #[inline(always)]
-fn greater(x: f64, y: f64) -> f64 {
+fn greater(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
