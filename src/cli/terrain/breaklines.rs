@@ -28,7 +28,7 @@ enum LineSpace {
 }
 
 /// From sample to sample: columns and rows.
-type Step = [[u32; 2]; 2];
+pub(super) type Step = [[u32; 2]; 2];
 
 /// What `--json` says of them; docs/json.md says what each field means.
 #[derive(Clone, Debug, Default, Serialize)]

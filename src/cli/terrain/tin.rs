@@ -1,6 +1,6 @@
 //! `progmesh terrain tin GRID OUT`.
 
-use super::breaklines::{BreaklineArgs, Breaklines};
+use super::breaklines::{BreaklineArgs, Breaklines, Step};
 use super::dress::DressArgs;
 use super::facts::facts;
 use super::input::{GridInput, known_spacing, whole};
@@ -199,6 +199,9 @@ fn factor(text: &str) -> Result<f64, String> {
 /// The height range is at most this part of the longer side in a picture of a grid whose spacing nobody knows.
 const PICTURE_RELIEF: f64 = 0.12;
 
+/// Without an error to keep, breaklines stay within this part of the range of heights of the ground.
+const LINE_SHARE: f64 = 0.005;
+
 impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
@@ -246,6 +249,7 @@ impl Args {
             interrupt.be_graceful();
             let making = Instant::now();
             let (lines, mut breaklines) = self.breaklines.steps(&source, None, warnings)?;
+            let lines = self.draped(&grid, &lines, breaklines.as_mut());
             let options = self.options().with_breaklines(lines);
             let progress = Progress::new(interrupt, self.quiet, "triangulating");
             let made =
@@ -346,6 +350,8 @@ impl Args {
                 _ => None,
             };
             let (lines, mut breaklines) = self.breaklines.steps(&source, geodetic.as_ref(), warnings)?;
+            let ground = geodetic.as_ref().map_or(&grid, |g| &g.grid);
+            let lines = self.draped(ground, &lines, breaklines.as_mut());
             let job = Job {
                 file: &file,
                 source: &source,
@@ -390,6 +396,16 @@ impl Args {
             format!("{file}: {samples} void samples ({voids} voids) were filled from their rims: these heights are invented")
         }));
         (grid, Some(filled.samples))
+    }
+
+    /// Breaklines in pieces that stay near the ground.
+    fn draped(&self, grid: &Grid, lines: &[Step], facts: Option<&mut Breaklines>) -> Vec<Step> {
+        let range = grid.range().map_or(0.0, |(least, greatest)| greatest - least);
+        let lines = tin::drape(grid, lines, self.max_error.unwrap_or(range * LINE_SHARE));
+        if let Some(facts) = facts {
+            facts.steps = lines.len();
+        }
+        lines
     }
 
     fn options(&self) -> Options {

@@ -24,6 +24,7 @@ mod blocks;
 mod borders;
 mod breaklines;
 mod delaunay;
+mod drape;
 mod field;
 mod fill;
 mod frame;
@@ -47,6 +48,7 @@ mod tiles;
 mod verify;
 
 pub use borders::Borders;
+pub use drape::drape;
 pub use make::triangulate;
 pub use options::{Contract, Control, Errors, Made, Method, Options, Outlined, Quiet, Tin, TinError};
 pub use tiles::{Cuts, Level, Tiling};
