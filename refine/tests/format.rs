@@ -248,16 +248,46 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
 }
 
 /// Files of three meshes, a scene and all kinds of chunks; small enough to be damaged everywhere.
-fn victims() -> [Vec<u8>; 2] {
-    let meshes = vec![sample("scan", 180, 1), sample("polygons", 100, 1), sample("cad", 120, 1)];
-    let mut all = build_all(meshes, &[1.0; 3], &Options::default(), &Quiet).unwrap();
-    let given = vec![0.25; all.meshes[2].splits.len()];
-    let bounds = Bounds::with_errors(&all.meshes[2], &given, Guarantee::Proven).unwrap();
-    all.meshes[2].bounds = Some(Arc::new(bounds));
-    [false, true].map(|sequential| {
-        let options = EncodeOptions::default().with_chunk(Some(40)).with_sequential(sequential);
+fn victims() -> [Vec<u8>; 3] {
+    let files = [(false, [180, 100, 120]), (true, [180, 100, 120]), (false, [60, 40, 60])];
+    [0, 1, 2].map(|k| {
+        let (sequential, [a, b, c]) = files[k];
+        let meshes = vec![sample("scan", a, 1), sample("polygons", b, 1), sample("cad", c, 1)];
+        let mut all = build_all(meshes, &[1.0; 3], &Options::default(), &Quiet).unwrap();
+        let paged = k == 2;
+        for pm in all.meshes.iter_mut().skip(if paged { 0 } else { 2 }) {
+            let given = vec![0.25; pm.splits.len()];
+            pm.bounds = Some(Arc::new(Bounds::with_errors(pm, &given, Guarantee::Proven).unwrap()));
+        }
+        let mut options = EncodeOptions::default().with_chunk(Some(40)).with_sequential(sequential);
+        if paged {
+            options = options.with_pages(true).with_other(ChunkType::TERRAIN, 0, b"of a grid".to_vec());
+            options = options.with_other(ChunkType::EXTRAS, 1, b"beside".to_vec());
+        }
         encode(&all.meshes, &all.turns, b"a scene", &options).unwrap()
     })
+}
+
+#[test]
+fn victims_hold_every_kind_of_chunk() {
+    let kinds: Vec<ChunkType> = victims()
+        .iter()
+        .flat_map(|v| {
+            RangeReader::new(&v[..]).unwrap().directory().chunks.iter().map(|c| c.kind).collect::<Vec<_>>()
+        })
+        .collect();
+    let all = [
+        ChunkType::BASE,
+        ChunkType::SPLITS,
+        ChunkType::SEQUEL,
+        ChunkType::ORDER,
+        ChunkType::PAGE,
+        ChunkType::SCENE,
+        ChunkType::BOUNDS,
+        ChunkType::EXTRAS,
+        ChunkType::TERRAIN,
+    ];
+    assert!(all.iter().all(|kind| kinds.contains(kind)), "{kinds:?}");
 }
 
 /// Whatever was read can be walked without a panic.
@@ -362,6 +392,8 @@ fn use_what_is_whole(bytes: &[u8]) {
             (ChunkType::BASE, Some(mesh)) => *mesh = ProgressiveMesh::default(),
             (ChunkType::BOUNDS, Some(mesh)) => mesh.bounds = None,
             (ChunkType::SCENE, _) => want.scene = None,
+            (ChunkType::EXTRAS, _) => assert!(d.extras.is_empty() && !whole.extras.is_empty()),
+            (ChunkType::PAGE | ChunkType::TERRAIN, _) => {}
             (ChunkType::ORDER, Some(_)) => {
                 let have = &d.meshes[c.mesh as usize];
                 assert!(have.order.is_none());
@@ -429,12 +461,26 @@ fn change_places(bytes: &[u8]) {
     };
     let all: Vec<usize> = (0..n).collect();
     assert_eq!(build(&all), bytes);
+    let whole = decode(bytes).unwrap();
+    // All that can be used is what was written, as far as it goes.
+    let is_a_part = |d: &Decoded| {
+        for (have, was) in d.meshes.iter().zip(&whole.meshes) {
+            let n = have.splits.len();
+            assert!(have.base_faces.is_empty() || have.base_faces == was.base_faces);
+            assert_eq!(have.splits.vertex, was.splits.vertex[..n]);
+            assert_eq!(have.splits.error, was.splits.error[..n]);
+        }
+        walk(d);
+    };
     for k in 0..n {
+        let kind = directory.chunks[k].kind;
         let mut twice = all.clone();
         twice.insert(k, k);
-        let spare =
-            [ChunkType::SCENE, ChunkType::ORDER, ChunkType::BOUNDS].contains(&directory.chunks[k].kind);
-        assert!(decode(&build(&twice)).is_err(), "{k}: {}", directory.chunks[k].kind);
+        let bad = build(&twice);
+        let Err(FormatError::Chunk { index, kind: named, .. }) = decode(&bad) else { panic!("{k}: {kind}") };
+        assert_eq!((index as usize, named), (k + 1, kind));
+        is_a_part(&decode_prefix(&bad).unwrap());
+        let spare = ![ChunkType::BASE, ChunkType::SPLITS, ChunkType::SEQUEL].contains(&kind);
         let mut less = all.clone();
         less.remove(k);
         if let Ok(d) = decode(&build(&less)) {
@@ -444,9 +490,17 @@ fn change_places(bytes: &[u8]) {
         for j in 0..k {
             let mut swapped = all.clone();
             swapped.swap(j, k);
-            match decode(&build(&swapped)) {
-                Ok(d) => walk(&d),
-                Err(e) => assert!(!e.to_string().is_empty()),
+            let bad = build(&swapped);
+            match decode(&bad) {
+                // Those of several meshes may stand in any order.
+                Ok(d) => {
+                    assert!(d.meshes == whole.meshes && d.scene == whole.scene && d.extras == whole.extras)
+                }
+                Err(FormatError::Chunk { index, .. }) => {
+                    assert!((j..=k).contains(&(index as usize)), "{index} of {j} and {k}");
+                    is_a_part(&decode_prefix(&bad).unwrap());
+                }
+                Err(e) => panic!("{j} and {k}: {e}"),
             }
         }
     }

@@ -32,6 +32,17 @@ struct Part {
     sequel: Option<Sequel>,
     /// Damage has ended it.
     void: bool,
+    beside: Beside,
+}
+
+/// Chunks of a mesh that stand beside others, as far as there were any.
+#[derive(Clone, Debug, Default)]
+struct Beside {
+    /// The page of the base.
+    base: bool,
+    /// Pages stand up to this split.
+    paged: usize,
+    terrain: bool,
 }
 
 impl Part {
@@ -46,6 +57,21 @@ impl Part {
             self.wedges += block.new_wedges();
         }
         follows
+    }
+
+    /// Whether a page, or what the mesh is of a grid, stands where such a chunk must: then it has been noted.
+    fn takes_beside(&mut self, chunk: &Chunk) -> bool {
+        let (now, beside) = (self.mesh.splits.len(), &mut self.beside);
+        match chunk.kind {
+            ChunkType::PAGE if now == 0 => !std::mem::replace(&mut beside.base, true),
+            ChunkType::PAGE => {
+                let next = chunk.first as usize + chunk.count as usize == now && beside.paged < now;
+                beside.paged = now;
+                next
+            }
+            ChunkType::TERRAIN => now == 0 && !std::mem::replace(&mut beside.terrain, true),
+            _ => true,
+        }
     }
 
     /// The splits of a chunk that is read with the mesh.
@@ -124,10 +150,20 @@ impl Assembly {
             (Piece::Base(both), Some(part @ None)) => {
                 let (head, mesh) = *both;
                 let (faces, wedges) = (head.base_faces as usize, head.base_wedges as usize);
-                *part = Some(Part { head, mesh, faces, wedges, bounds: None, sequel: None, void: false });
+                *part = Some(Part {
+                    head,
+                    mesh,
+                    faces,
+                    wedges,
+                    bounds: None,
+                    sequel: None,
+                    void: false,
+                    beside: Beside::default(),
+                });
             }
             (Piece::Splits(block), Some(Some(part))) => {
-                if part.sequel.is_some() || !part.append(&block) {
+                let follows = chunk.first as usize == part.mesh.splits.len();
+                if !follows || part.sequel.is_some() || !part.append(&block) {
                     return Err(chunk.damage("its splits do not follow those before"));
                 }
                 self.turns.extend(std::iter::repeat_n(chunk.mesh, block.splits.len()));
@@ -173,6 +209,14 @@ impl Assembly {
                     return Err(chunk.damage("it does not follow what came before"));
                 }
                 self.extras.push((chunk.mesh, bytes));
+            }
+            (Piece::Other(_), Some(Some(part))) => {
+                if !part.takes_beside(chunk) {
+                    return Err(chunk.damage("it does not stand where it must, or is there twice"));
+                }
+            }
+            (Piece::Other(_), Some(None)) if [ChunkType::PAGE, ChunkType::TERRAIN].contains(&chunk.kind) => {
+                return Err(chunk.damage("the base of its mesh is not there"));
             }
             (Piece::Other(_), _) => {}
             _ => return Err(chunk.damage("it does not follow what came before")),

@@ -288,37 +288,38 @@ impl Directory {
         }
     }
 
-    /// The same with a wrong checksum, which is returned beside it, as long as chunks stand side by side and go together: they have checksums of their own.
+    /// The same of a directory with a wrong checksum, or with chunks that do not follow each other as they must, which is returned beside it, as long as chunks stand side by side: they
+    /// have checksums of their own.
     pub(super) fn salvage(bytes: &[u8]) -> Result<(Directory, Option<FormatError>), FormatError> {
         if bytes.len() < Self::length(bytes)? {
             return Err(FormatError::Head("the file ends within the directory"));
         }
         if head_checksum(bytes) == u32_at(bytes, HEAD - 4) {
-            return Ok((Self::parse(bytes)?, None));
+            return Self::parse(bytes);
         }
         let damage = FormatError::Head("its checksum is another");
         match Self::parse(bytes) {
-            Ok(directory) => Ok((directory, Some(damage))),
+            Ok((directory, _)) => Ok((directory, Some(damage))),
             Err(_) => Err(damage),
         }
     }
 
-    fn parse(bytes: &[u8]) -> Result<Directory, FormatError> {
+    fn parse(bytes: &[u8]) -> Result<(Directory, Option<FormatError>), FormatError> {
         let entries = bytes[HEAD..].chunks_exact(ENTRY).zip(0..);
         let directory = Directory {
             meshes: u32_at(bytes, 20),
             chunks: entries.map(|(b, index)| Chunk::take(b, index)).collect(),
         };
-        directory.check()?;
+        let misplaced = directory.check()?;
         let length = u32_at(bytes, 32) as u64 | (u32_at(bytes, 36) as u64) << 32;
         if length != directory.file_bytes() {
             return Err(FormatError::Head("the length of the file does not go with its chunks"));
         }
-        Ok(directory)
+        Ok((directory, misplaced))
     }
 
-    /// Chunks side by side, and those of a mesh in sequence.
-    fn check(&self) -> Result<(), FormatError> {
+    /// Chunks side by side; returns the first of those of a mesh that is not in sequence, as an error.
+    fn check(&self) -> Result<Option<FormatError>, FormatError> {
         let mut at = self.bytes();
         // For every mesh that has begun: splits and faces so far.
         let mut state: Vec<Option<u32>> = Vec::new();
@@ -326,7 +327,11 @@ impl Directory {
             return Err(FormatError::Head("more meshes than chunks"));
         }
         state.resize(self.meshes as usize, None);
+        let mut first = None;
         for c in &self.chunks {
+            let mut misplaced = |what| {
+                first.get_or_insert_with(|| c.damage(what));
+            };
             if c.offset != at {
                 return Err(c.damage("it does not begin where the one before ends"));
             }
@@ -353,26 +358,26 @@ impl Directory {
                 continue;
             }
             let Some(mesh) = state.get_mut(c.mesh as usize) else {
-                return Err(c.damage("there is no such mesh"));
+                misplaced("there is no such mesh");
+                continue;
             };
             match (c.kind, *mesh) {
                 (ChunkType::BASE, None) => *mesh = Some(0),
-                (ChunkType::BASE, Some(_)) => return Err(c.damage("the mesh has a base already")),
-                (_, None) => return Err(c.damage("it comes before the base of its mesh")),
-                (ChunkType::SPLITS | ChunkType::SEQUEL, Some(n)) => {
-                    if c.first != n {
-                        return Err(c.damage("its splits do not follow those before"));
-                    }
-                    *mesh = Some(
-                        n.checked_add(c.count).ok_or_else(|| c.damage("more splits than ids can name"))?,
-                    );
+                (ChunkType::BASE, Some(_)) => misplaced("the mesh has a base already"),
+                (_, None) => misplaced("it comes before the base of its mesh"),
+                (ChunkType::SPLITS | ChunkType::SEQUEL, Some(n)) if c.first != n => {
+                    misplaced("its splits do not follow those before");
                 }
+                (ChunkType::SPLITS | ChunkType::SEQUEL, Some(n)) => match n.checked_add(c.count) {
+                    Some(n) => *mesh = Some(n),
+                    None => misplaced("more splits than ids can name"),
+                },
                 _ => {}
             }
         }
         match state.iter().position(Option::is_none) {
-            Some(_) => Err(FormatError::Head("a mesh without a base")),
-            None => Ok(()),
+            Some(_) => Err(first.unwrap_or(FormatError::Head("a mesh without a base"))),
+            None => Ok(first),
         }
     }
 }

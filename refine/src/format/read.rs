@@ -93,7 +93,11 @@ pub fn decode_prefix(bytes: &[u8]) -> Result<Decoded, FormatError> {
     };
     // Bases first, as every other chunk needs them; then all others by themselves; then all together.
     let (bases, others): (Vec<&Chunk>, _) = directory.chunks.iter().partition(|c| c.kind == ChunkType::BASE);
-    let mut failed_at = if damage.is_some() { 0 } else { u32::MAX };
+    let mut failed_at = match &damage {
+        Some(FormatError::Chunk { index, .. }) => *index,
+        Some(_) => 0,
+        None => u32::MAX,
+    };
     let mut lost = Vec::new();
     let mut note = |chunk: &Chunk, e: FormatError| {
         lost.push(*chunk);

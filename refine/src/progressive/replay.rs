@@ -117,33 +117,75 @@ impl<'a> WedgeReplay<'a> {
     }
 
     /// Undoes collapse `i`; returns the bits of its code. O(valence).
+    #[inline]
     pub(super) fn split(&mut self, i: usize, l: &LoggedWing, r: &LoggedWing) -> u16 {
+        let ends = [self.ends_of_run(l), self.ends_of_run(r)];
         let (corners, rows) = self.run_of(i);
-        let two = r.face != NONE;
-        // Coarse wedges at both ends of the run of faces that go to the new vertex.
-        let inner = |wing: &LoggedWing| {
-            (wing.removed_half != NONE).then(|| self.at(wing.removed_half, wing.removed_half_starts))
-        };
-        let outer = |wing: &LoggedWing| {
-            (wing.kept_half != NONE).then(|| self.at(wing.kept_half, wing.kept_half_starts))
-        };
-        // A face has one across one of its sides at least.
-        let plain_l = inner(l).or_else(|| outer(l)).unwrap_or(0);
-        let plain_r = inner(r).filter(|_| two).unwrap_or(plain_l);
-        let (x_l, x_r) =
-            if two { super::seam_wedges(plain_l, plain_r, outer(l), outer(r)) } else { (plain_l, plain_r) };
         self.go_back(corners, rows);
-        // Corners of the new faces: at the old vertex, the new one, the tip.
-        let of_wing = |wing: &LoggedWing| {
-            let c = 3 * wing.face as usize;
-            let a = wing.slot as usize;
-            let b = next(a);
-            let at = |k: usize| self.wedges.corner[c + k];
-            let (vt, vu) = if wing.kept_first { (at(a), at(b)) } else { (at(b), at(a)) };
-            [vt, vu, at(next(b))]
-        };
-        let fl = of_wing(l);
-        let fr = if two { of_wing(r) } else { [plain_l, fl[1], NONE] };
+        self.plain_split(l, r, ends).unwrap_or_else(|| self.any_split(l, r, ends))
+    }
+
+    /// Coarse wedges at an end of the run of faces that go to the new vertex: of its last face, and of that beyond.
+    #[inline]
+    fn ends_of_run(&self, wing: &LoggedWing) -> [Option<u32>; 2] {
+        let inner = (wing.removed_half != NONE).then(|| self.at(wing.removed_half, wing.removed_half_starts));
+        let outer = (wing.kept_half != NONE).then(|| self.at(wing.kept_half, wing.kept_half_starts));
+        [inner, outer]
+    }
+
+    /// The wedges of a new face: at the old vertex, the new one, the tip.
+    #[inline]
+    fn of_wing(&self, wing: &LoggedWing) -> [u32; 3] {
+        let c = 3 * wing.face as usize;
+        let a = wing.slot as usize;
+        let b = next(a);
+        let at = |k: usize| self.wedges.corner[c + k];
+        let (vt, vu) = if wing.kept_first { (at(a), at(b)) } else { (at(b), at(a)) };
+        [vt, vu, at(next(b))]
+    }
+
+    /// The bits of a split that makes one wedge of another, as nearly all do; `None` if this is none.
+    #[inline]
+    fn plain_split(&mut self, l: &LoggedWing, r: &LoggedWing, ends: [[Option<u32>; 2]; 2]) -> Option<u16> {
+        let &[(coarse, fine)] = &self.pairs[..] else { return None };
+        let two = r.face != NONE;
+        let first = ends[0][0].or(ends[0][1]).unwrap_or(0);
+        let fl = self.of_wing(l);
+        let one = first == coarse && fl[0] == coarse && fl[1] == fine && self.slot[fine as usize] == NONE;
+        if !one || self.changed.iter().any(|&w| w != coarse) {
+            return None;
+        }
+        let mut bits = if self.tip(l, fl[2])? { SplitCode::L_TIP_INNER } else { 0 };
+        if two {
+            let fr = self.of_wing(r);
+            if ends[1][0].unwrap_or(coarse) != coarse || fr[0] != coarse || fr[1] != fine {
+                return None;
+            }
+            bits |= if self.tip(r, fr[2])? { SplitCode::R_TIP_INNER } else { 0 };
+        }
+        self.slot[fine as usize] = self.count;
+        self.count += 1;
+        push_row(&mut self.out, &self.wedges, fine);
+        if !self.changed.is_empty() {
+            bits |= SplitCode::ROWS;
+            push_row(&mut self.out, &self.wedges, coarse);
+        }
+        Some(bits)
+    }
+
+    /// The bits of any split.
+    #[cold]
+    #[inline(never)]
+    fn any_split(&mut self, l: &LoggedWing, r: &LoggedWing, ends: [[Option<u32>; 2]; 2]) -> u16 {
+        let two = r.face != NONE;
+        let [[inner_l, outer_l], [inner_r, outer_r]] = ends;
+        // A face has one across one of its sides at least.
+        let plain_l = inner_l.or(outer_l).unwrap_or(0);
+        let plain_r = inner_r.filter(|_| two).unwrap_or(plain_l);
+        let (x_l, x_r) =
+            if two { super::seam_wedges(plain_l, plain_r, outer_l, outer_r) } else { (plain_l, plain_r) };
+        let fl = self.of_wing(l);
+        let fr = if two { self.of_wing(r) } else { [plain_l, fl[1], NONE] };
         // New wedges that only the new faces have.
         for w in [(fl[0], fl[1]), (fr[0], fr[1])] {
             if self.slot[w.1 as usize] == NONE && self.pairs.iter().all(|p| p.1 != w.1) {

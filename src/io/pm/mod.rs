@@ -71,7 +71,9 @@ pub fn decode_what_is_there(bytes: &[u8]) -> Result<DecodedProgressive, DecodeEr
     }
     let mut decoded = format::decode_prefix(bytes)?;
     let lost = &decoded.report.lost;
-    let bases = lost.iter().filter(|c| c.kind == ChunkType::BASE).count();
+    // (Of a base that is there twice the second is lost, but not the mesh.)
+    let gone = |m: u32| decoded.meshes.get(m as usize).is_some_and(|mesh| mesh.base_vertices() == 0);
+    let bases = lost.iter().filter(|c| c.kind == ChunkType::BASE && gone(c.mesh)).count();
     let warnings: Vec<String> = match &decoded.report.damage {
         Some(damage) if bases == decoded.meshes.len() => return Err(damage.clone().into()),
         Some(damage) => vec![what_is_used(damage, &decoded, bases)],
