@@ -80,6 +80,9 @@ impl Mesh {
         if whole && is_by_first_use(w) {
             return Some(w.clone());
         }
+        if whole {
+            return Some(by_first_use(w, 0..w.corner.len(), w.corner.len()));
+        }
         let slots = t.faces().flat_map(|f| t.corner_range(f));
         Some(by_first_use(w, slots, w.corner.len()))
     }
@@ -148,17 +151,15 @@ fn is_by_first_use(w: &Wedges) -> bool {
 fn by_first_use(w: &Wedges, slots: impl Iterator<Item = usize>, corners: usize) -> Wedges {
     let (mut map, mut old) = (vec![NONE; w.len()], Vec::new());
     let mut corner = Vec::with_capacity(corners);
-    for x in slots.map(|c| w.corner[c]) {
-        let Some(to) = map.get_mut(x as usize) else {
-            corner.push(NONE);
-            continue;
-        };
+    corner.extend(slots.map(|c| {
+        let x = w.corner[c];
+        let Some(to) = map.get_mut(x as usize) else { return NONE };
         if *to == NONE {
             *to = old.len() as u32;
             old.push(x);
         }
-        corner.push(*to);
-    }
+        *to
+    }));
     w.gather(&old, corner)
 }
 

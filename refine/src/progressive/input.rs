@@ -94,15 +94,18 @@ impl InputOrder {
         let slots = slot.iter().filter(|s| **s != NONE).count();
         let mut of_slot = vec![UNSEEN; slots];
         let mut source = vec![NONE; input.len()];
+        let mut others = Vec::new();
         let mut note = |c: usize, w: u32, m: u32| {
             let of = &mut of_slot[slot[m as usize] as usize];
-            if *of == UNSEEN {
-                *of = w;
-            } else if *of != w {
-                self.corner_wedges.push((c as u32, w));
+            if *of != w {
+                if *of == UNSEEN {
+                    *of = w;
+                } else {
+                    others.push((c as u32, w));
+                }
             }
-            if w != NONE {
-                source[w as usize] = m;
+            if let Some(source) = source.get_mut(w as usize) {
+                *source = m;
             }
         };
         let corners = input.corner.iter().enumerate();
@@ -110,6 +113,7 @@ impl InputOrder {
             None => corners.zip(&full.corner).for_each(|((c, &w), &m)| note(c, w, m)),
             Some(p) => corners.zip(&p.corners).for_each(|((c, &w), &k)| note(c, w, full.corner[k as usize])),
         }
+        self.corner_wedges.append(&mut others);
         self.wedge = of_slot.into_iter().map(|w| if w == UNSEEN { NONE } else { w }).collect();
         for (w, &m) in source.iter().enumerate() {
             let row = input.row(w as u32);
