@@ -211,7 +211,9 @@ fn terrain_tin() {
     let lines: TerrainTin =
         serde_json::from_str(&p.done(&format!("{TERRAIN} --breaklines lines.json")).stdout).unwrap();
     let b = lines.breaklines.unwrap();
-    assert_eq!((b.lines, b.steps, b.beyond, b.bent, b.outside, b.missing), (1, 1, 0, 0, 0, Some(0)));
+    // Over ground as rough as this the line takes more than one piece.
+    assert!(b.steps > 1);
+    assert_eq!((b.lines, b.beyond, b.bent, b.outside, b.missing), (1, 0, 0, 0, Some(0)));
     let simple = format!("{TERRAIN} --nodata 0 --outline-tolerance 1");
     let simple: TerrainTin = serde_json::from_str(&p.done(&simple).stdout).unwrap();
     let (o, v) = (simple.outline.unwrap(), simple.verified.unwrap());
