@@ -46,15 +46,66 @@ pub struct Geomorph {
 /// Attributes at both ends, a row a wedge.
 #[derive(Clone, Debug)]
 struct Ends {
-    channels: Vec<Channel>,
-    offsets: Vec<usize>,
-    stride: usize,
+    mix: Mix,
     start: Vec<f32>,
     end: Vec<f32>,
     start_present: Vec<u64>,
     end_present: Vec<u64>,
+}
+
+/// How rows of attributes turn into others: see [`Geomorph`].
+#[derive(Clone, Debug)]
+pub(crate) struct Mix {
+    channels: Vec<Channel>,
+    offsets: Vec<usize>,
+    stride: usize,
     /// For every channel, the channel of joint indices that must be equal at both ends for it to run linearly.
     joints_of: Vec<Option<usize>>,
+}
+
+impl Mix {
+    pub(crate) fn new(channels: &[Channel]) -> Mix {
+        let mut stride = 0;
+        let mut offsets = Vec::with_capacity(channels.len());
+        for c in channels {
+            offsets.push(stride);
+            stride += c.width;
+        }
+        let joints_of = channels
+            .iter()
+            .map(|c| match c.semantic {
+                Semantic::Weights(k) => channels.iter().position(|j| j.semantic == Semantic::Joints(k)),
+                _ => None,
+            })
+            .collect();
+        Mix { channels: channels.to_vec(), offsets, stride, joints_of }
+    }
+
+    /// The row at `a`, 0 to 1, between two rows and the channels they have, into `out`; returns the channels it has.
+    pub(crate) fn row(
+        &self,
+        (p, has): (&[f32], u64),
+        (q, will): (&[f32], u64),
+        a: f64,
+        out: &mut [f32],
+    ) -> u64 {
+        let near_end = a >= 0.5;
+        for (k, c) in self.channels.iter().enumerate() {
+            let at = self.offsets[k]..self.offsets[k] + c.width;
+            let (p_k, q_k) = (&p[at.clone()], &q[at.clone()]);
+            let joints = self.joints_of[k].is_none_or(|j| {
+                let at = self.offsets[j]..self.offsets[j] + self.channels[j].width;
+                p[at.clone()] == q[at]
+            });
+            let both = has & will & (1 << k) != 0;
+            if both && c.interpolates() && joints {
+                mix_channel(&c.semantic, p_k, q_k, a, &mut out[at]);
+            } else {
+                out[at].copy_from_slice(if near_end { q_k } else { p_k });
+            }
+        }
+        if near_end { will } else { has }
+    }
 }
 
 impl Geomorph {
@@ -163,19 +214,6 @@ impl Ends {
         fine: &Cursor<P>,
         ancestors: &[u32],
     ) -> Self {
-        let mut stride = 0;
-        let mut offsets = Vec::with_capacity(channels.len());
-        for c in &channels {
-            offsets.push(stride);
-            stride += c.width;
-        }
-        let joints_of = channels
-            .iter()
-            .map(|c| match c.semantic {
-                Semantic::Weights(k) => channels.iter().position(|j| j.semantic == Semantic::Joints(k)),
-                _ => None,
-            })
-            .collect();
         let (mut start, mut end) = (Vec::new(), Vec::new());
         let (mut start_present, mut end_present) = (Vec::new(), Vec::new());
         for (w, &from) in (0u32..).zip(ancestors) {
@@ -184,33 +222,19 @@ impl Ends {
             start.extend_from_slice(coarse.row(from));
             start_present.push(coarse.present(from));
         }
-        Ends { channels, offsets, stride, start, end, start_present, end_present, joints_of }
+        Ends { mix: Mix::new(&channels), start, end, start_present, end_present }
     }
 
     /// The wedges at `a`; `None` if the channels are no channels.
     fn at(&self, a: f64, faces: &[[u32; 3]]) -> Option<Wedges> {
-        let mut wedges = Wedges::new(self.channels.clone()).ok()?;
-        let mut row = vec![0.0; self.stride];
+        let mut wedges = Wedges::new(self.mix.channels.clone()).ok()?;
+        let stride = self.mix.stride;
+        let mut row = vec![0.0; stride];
         for w in 0..self.start_present.len() {
-            let range = w * self.stride..(w + 1) * self.stride;
+            let range = w * stride..(w + 1) * stride;
             let (p, q) = (&self.start[range.clone()], &self.end[range]);
-            let (has, will) = (self.start_present[w], self.end_present[w]);
-            let near_end = a >= 0.5;
-            for (k, c) in self.channels.iter().enumerate() {
-                let at = self.offsets[k]..self.offsets[k] + c.width;
-                let (p_k, q_k) = (&p[at.clone()], &q[at.clone()]);
-                let joints = self.joints_of[k].is_none_or(|j| {
-                    let at = self.offsets[j]..self.offsets[j] + self.channels[j].width;
-                    p[at.clone()] == q[at]
-                });
-                let both = has & will & (1 << k) != 0;
-                if both && c.interpolates() && joints {
-                    mix_channel(&c.semantic, p_k, q_k, a, &mut row[at]);
-                } else {
-                    row[at].copy_from_slice(if near_end { q_k } else { p_k });
-                }
-            }
-            wedges.push(&row, if near_end { will } else { has });
+            let present = self.mix.row((p, self.start_present[w]), (q, self.end_present[w]), a, &mut row);
+            wedges.push(&row, present);
         }
         let present = |w: u32| wedges.present(w) != 0;
         let corner = faces.as_flattened().iter().map(|&w| if present(w) { w } else { NONE }).collect();

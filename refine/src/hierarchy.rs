@@ -35,7 +35,7 @@ use crate::progressive::{Damage, ProgressiveMesh};
 use crate::selective::Front;
 use glam::DVec3;
 use rings::{Needs, Rings};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// When a split may be made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -112,6 +112,8 @@ pub struct Hierarchy {
     mesh: Arc<ProgressiveMesh>,
     pub(crate) forest: Forest,
     pub(crate) bounds: Arc<Bounds>,
+    /// See [`Hierarchy::row_parents`].
+    row_parents: OnceLock<Vec<u32>>,
 }
 
 /// Goes through all splits, so that every reference is followed, and gives the hierarchy and the finest mesh; and by the ring rule, if it holds, the longest chain of splits
@@ -254,11 +256,15 @@ impl Hierarchy {
         {
             let mut bounds = s.bounds;
             bounds.turns = Vec::new();
-            return Ok(Hierarchy { mesh: Arc::new(s.mesh), forest: s.forest, bounds: Arc::new(bounds) });
+            return Ok(Hierarchy::of(Arc::new(s.mesh), s.forest, Arc::new(bounds)));
         }
         let (forest, front, _) = finest(&mesh, Rule::Cuts)?;
         let bounds = Arc::new(deviation::measure(&mesh, &forest, &front, options));
-        Ok(Hierarchy { mesh, forest, bounds })
+        Ok(Hierarchy::of(mesh, forest, bounds))
+    }
+
+    fn of(mesh: Arc<ProgressiveMesh>, forest: Forest, bounds: Arc<Bounds>) -> Hierarchy {
+        Hierarchy { mesh, forest, bounds, row_parents: OnceLock::new() }
     }
 
     fn with_bounds(mesh: Arc<ProgressiveMesh>, bounds: Arc<Bounds>) -> Result<Hierarchy, Damage> {
@@ -269,7 +275,7 @@ impl Hierarchy {
         if bounds.guarantee() != Guarantee::Settled {
             let (forest, _, _) = finest(&mesh, Rule::Cuts)?;
             bounds.check(&mesh, &forest)?;
-            return Ok(Hierarchy { mesh, forest, bounds });
+            return Ok(Hierarchy::of(mesh, forest, bounds));
         }
         if bounds.turns.len() != n {
             return Err(Damage::Length { what: "turns", len: bounds.turns.len(), want: n });
@@ -291,7 +297,7 @@ impl Hierarchy {
         }
         bounds.turns = Vec::new();
         bounds.check(&mesh, &forest)?;
-        Ok(Hierarchy { mesh: Arc::new(mesh), forest, bounds: Arc::new(bounds) })
+        Ok(Hierarchy::of(Arc::new(mesh), forest, Arc::new(bounds)))
     }
 
     /// The progressive mesh, with its splits in the order in which they are numbered here.
@@ -331,6 +337,13 @@ impl Hierarchy {
     #[inline]
     pub(crate) fn direction(&self, i: u32) -> Direction {
         self.bounds.directions.get(i as usize).copied().unwrap_or_default()
+    }
+
+    /// For every row of attributes the one it comes of: that of the same wedge, or of the one it was parted from, before the split that made the row. Found when it is first asked for, 4 B a row. O(n), once.
+    pub(crate) fn row_parents(&self) -> &[u32] {
+        // The splits have been gone through before: there is no damage.
+        self.row_parents
+            .get_or_init(|| self.mesh.cursor().and_then(|mut c| c.seek_with_lineage()).unwrap_or_default())
     }
 
     /// Where split `i` is, about the origin of the bounds, as everything is that is decided about it.

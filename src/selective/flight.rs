@@ -162,6 +162,11 @@ fn frames(text: &str, space: &FrameSpace) -> Result<FlightPath, PathError> {
         if [fx, fy, fz] == [0.0; 3] {
             return Err(wrong("front is 0, 0, 0: it must say which way the camera looks".into()));
         }
+        if zoom <= 0.0 {
+            return Err(wrong(format!(
+                "zoom is {zoom}: the tangent of half an angle of view is more than 0"
+            )));
+        }
         let eye = space.to_world.transform_point3(space.scale * DVec3::new(ex, ey, ez));
         let [front, up] = [[fx, fy, fz], [ux, uy, uz]].map(|d| space.to_world.transform_vector3(d.into()));
         let [near, far] = space.depths;
@@ -230,6 +235,7 @@ mod tests {
         assert!(said("F 0 1 2 3\n").contains("line 1: 3 numbers"));
         assert!(said("x\nF 0 a\n").contains("line 2: a"));
         assert!(said(&line.replace("0.6 -0.8 0 ", "0 0 0")).contains("line 1: front is 0, 0, 0"));
+        assert!(said(&line.replace("0.04  0.5", "0.04  0")).contains("line 1: zoom is 0"));
         assert!(said("nothing\n").contains("no frames"));
         assert!(said("[1, ").contains("line 1"));
         assert!(said("[{}]").contains("camera 0"));

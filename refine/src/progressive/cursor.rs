@@ -78,6 +78,31 @@ pub struct Cursor<P: Deref<Target = ProgressiveMesh>> {
     touched: Option<Touched>,
     /// The wedge of every wedge at the split count where this began.
     descent: Option<Vec<u32>>,
+    lineage: Option<Lineage>,
+}
+
+/// Which row of attributes each came of, while splits are applied from the base on.
+#[derive(Clone, Debug, Default)]
+struct Lineage {
+    /// The row of every wedge.
+    row: Vec<u32>,
+    /// For every row the one that its wedge, or the wedge that was parted from, had before the split; rows of the base are their own.
+    parents: Vec<u32>,
+}
+
+impl Lineage {
+    /// A split parts new wedges from others, and changes some.
+    fn pass(&mut self, from: impl Iterator<Item = u32>, changed: &[u32]) {
+        let Lineage { row, parents } = self;
+        let first = parents.len();
+        parents.extend(from.map(|w| row[w as usize]));
+        let new = parents.len();
+        parents.extend(changed.iter().map(|&w| row[w as usize]));
+        row.extend(first as u32..new as u32);
+        for (k, &w) in (new as u32..).zip(changed) {
+            row[w as usize] = k;
+        }
+    }
 }
 
 /// What a [`Patch`] needs, while one is made.
@@ -127,6 +152,7 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
             position: 0,
             touched: None,
             descent: None,
+            lineage: None,
             source,
         })
     }
@@ -286,6 +312,18 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
         result.map(|()| descent)
     }
 
+    /// As [`Cursor::seek`] from the base to full detail; returns for every row of attributes the one it comes of.
+    ///
+    /// Errors: as [`Cursor::seek`].
+    pub(crate) fn seek_with_lineage(&mut self) -> Result<Vec<u32>, Damage> {
+        self.seek(0)?;
+        let rows: Vec<u32> = (0..self.wedges.as_ref().map_or(0, |w| w.vertex.len()) as u32).collect();
+        self.lineage = Some(Lineage { row: rows.clone(), parents: rows });
+        let result = self.seek(usize::MAX);
+        let lineage = self.lineage.take().unwrap_or_default();
+        result.map(|()| lineage.parents)
+    }
+
     /// Applies the next split; false at full detail. O(valence).
     ///
     /// Errors: damage; nothing has changed then.
@@ -351,11 +389,16 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
                 }
             }
         }
-        if let Some(from) = &mut self.descent {
+        if self.descent.is_some() || self.lineage.is_some() {
             let own = [(x[0], w), (x[1], w + 1)];
             let pairs = if code.kind() == SplitKind::Explicit { &explicit.pairs[..] } else { &own[..new] };
-            let fresh = pairs.iter().filter(|p| p.1 >= w);
-            fresh.for_each(|p| from.push(from[p.0 as usize]));
+            let fresh = pairs.iter().filter(|p| p.1 >= w).map(|p| p.0);
+            if let Some(from) = &mut self.descent {
+                fresh.clone().for_each(|p| from.push(from[p as usize]));
+            }
+            if let Some(lineage) = &mut self.lineage {
+                lineage.pass(fresh, changed);
+            }
         }
         if let Some(t) = &mut self.touched {
             t.wedges.extend_from_slice(changed);

@@ -63,14 +63,20 @@ impl Cut for View {
     }
 }
 
-/// Where vertex `v` is drawn if splits are to show themselves smoothly: see [`View::morphed`].
-pub(crate) fn morphed<C: Cut>(cut: &C, lenses: &[Lens], v: u32, band: f64) -> Option<DVec3> {
-    let node = Some(cut.node(v)).filter(|&k| k != NONE)?;
-    // From the node upwards to one that has moved wholly; then back down.
-    let mut weights = Vec::new();
-    let (mut at, mut vertex) = (node, v);
+/// The way from where a vertex is up to where it has wholly come from.
+pub(crate) struct Ascent {
+    /// Nodes, of which vertex each is, the split that made it, and how far that has shown itself; upwards.
+    pub(crate) steps: Vec<(u32, u32, u32, f64)>,
+    /// Where it ends: a node that is wholly there, and its vertex.
+    pub(crate) top: (u32, u32),
+}
+
+/// How far the splits that made vertex `v` have shown themselves if they are to do so smoothly: see [`View::morphed`].
+pub(crate) fn ascent<C: Cut>(cut: &C, lenses: &[Lens], v: u32, band: f64) -> Option<Ascent> {
+    let mut top = (Some(cut.node(v)).filter(|&k| k != NONE)?, v);
+    let mut steps = Vec::new();
     loop {
-        let i = cut.maker(at);
+        let i = cut.maker(top.0);
         if i == NONE {
             break;
         }
@@ -84,9 +90,16 @@ pub(crate) fn morphed<C: Cut>(cut: &C, lenses: &[Lens], v: u32, band: f64) -> Op
         if part >= 1.0 {
             break;
         }
-        weights.push((cut.place(at, vertex), part));
-        (at, vertex) = cut.parent(i);
+        steps.push((top.0, top.1, i, part));
+        top = cut.parent(i);
     }
-    let start = cut.place(at, vertex);
-    Some(weights.iter().rev().fold(start, |p, &(own, part)| p.lerp(own, part)))
+    Some(Ascent { steps, top })
+}
+
+/// Where vertex `v` is drawn if splits are to show themselves smoothly: see [`View::morphed`].
+pub(crate) fn morphed<C: Cut>(cut: &C, lenses: &[Lens], v: u32, band: f64) -> Option<DVec3> {
+    let Ascent { steps, top } = ascent(cut, lenses, v, band)?;
+    // From the top back down.
+    let start = cut.place(top.0, top.1);
+    Some(steps.iter().rev().fold(start, |p, &(node, vertex, _, part)| p.lerp(cut.place(node, vertex), part)))
 }

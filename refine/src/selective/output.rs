@@ -4,6 +4,7 @@ use super::View;
 use crate::Strips;
 use crate::aif::{MeshInput, NONE, Positions, Wedges};
 use glam::DVec3;
+use std::borrow::Cow;
 
 impl View {
     /// The index buffer: three wedges a slot. A slot without a face has three equal corners. Wedges are numbered as those of the progressive mesh at full
@@ -59,7 +60,18 @@ impl View {
     /// [`View::to_input`] with some vertices elsewhere: `places` by vertex, ascending, rounded to the stored precision. Of a mesh at full detail the order is that of the splits
     /// then, unless `places` is empty. O(n).
     pub fn to_input_with(&self, places: &[(u32, DVec3)]) -> MeshInput {
-        let mut out = self.input(places.is_empty());
+        let mut out = self.input(places.is_empty(), |w| self.own_row(w));
+        self.put(&mut out, places);
+        out
+    }
+
+    pub(super) fn own_row(&self, w: u32) -> (Cow<'_, [f32]>, u64) {
+        let (row, present) = self.row(w);
+        (row.into(), present)
+    }
+
+    /// Puts vertices elsewhere, ascending.
+    pub(super) fn put(&self, out: &mut MeshInput, places: &[(u32, DVec3)]) {
         let shown = (0..self.hierarchy.mesh().vertices() as u32).filter(|&v| self.front.has(v));
         let mut next = places.iter().peekable();
         for (k, v) in shown.enumerate() {
@@ -70,7 +82,6 @@ impl View {
                 Positions::F64(all) => all[k] = p.to_array(),
             }
         }
-        out
     }
 
     /// The faces shown as triangle strips over the wedges of [`View::indices`]. O(faces shown).
@@ -81,11 +92,15 @@ impl View {
     /// The mesh as flat arrays: vertices, faces and wedges that are shown, numbered in the order of the progressive mesh. If every split is applied, this is
     /// [`crate::Cursor::to_ordered_input`] at full detail: the input, bit for bit. O(n).
     pub fn to_input(&self) -> MeshInput {
-        self.input(true)
+        self.input(true, |w| self.own_row(w))
     }
 
-    /// [`View::to_input`]; `ordered`: full detail is in the input's order.
-    fn input(&self, ordered: bool) -> MeshInput {
+    /// [`View::to_input`] with such rows; `ordered`: full detail is in the input's order, with its own.
+    pub(super) fn input<'a>(
+        &self,
+        ordered: bool,
+        row_of: impl Fn(u32) -> (Cow<'a, [f32]>, u64),
+    ) -> MeshInput {
         let pm = self.hierarchy.mesh();
         let forest = &self.hierarchy.forest;
         if ordered
@@ -130,8 +145,8 @@ impl View {
             used.sort_unstable();
             used.dedup();
             for &w in &used {
-                let (row, present) = self.row(w);
-                let new = wedges.push(row, present);
+                let (row, present) = row_of(w);
+                let new = wedges.push(&row, present);
                 number[w as usize] = if present == 0 { NONE } else { new };
             }
             wedges.corner = corners().map(|w| number[w as usize]).collect();
