@@ -214,12 +214,11 @@ impl Forest {
         Some((self.firsts.before(k) + u32::from(first) - 1, !first))
     }
 
-    /// Where vertex `v` stands after the first `k` splits of its chain: the array, and the place in it.
+    /// Where vertex `v` stands after splits of its chain, the first ones: the array, and the place in it.
     #[inline]
-    fn stored<'a>(&self, pm: &'a ProgressiveMesh, v: u32, k: usize) -> (&'a Positions, usize) {
+    fn stored<'a>(&self, pm: &'a ProgressiveMesh, v: u32, applied: &[u32]) -> (&'a Positions, usize) {
         if self.moves.set > 0
-            && k > 0
-            && let Some(&j) = self.chain(v)[..k].iter().rev().find(|&&j| self.moves.get(j))
+            && let Some(&j) = applied.iter().rev().find(|&&j| self.moves.get(j))
         {
             return (&pm.moved_positions, self.moves.before(j) as usize);
         }
@@ -229,11 +228,17 @@ impl Forest {
         }
     }
 
+    /// Where vertex `v` stands after splits of its chain, the first ones. O(those that do not move it).
+    #[inline]
+    pub(crate) fn place_after(&self, pm: &ProgressiveMesh, v: u32, applied: &[u32]) -> DVec3 {
+        let (from, at) = self.stored(pm, v, applied);
+        from.get(at)
+    }
+
     /// Where vertex `v` stands after the first `k` splits of its chain. O(splits of it that do not move it).
     #[inline]
     pub(crate) fn place(&self, pm: &ProgressiveMesh, v: u32, k: usize) -> DVec3 {
-        let (from, at) = self.stored(pm, v, k);
-        from.get(at)
+        self.place_after(pm, v, &self.chain(v)[..k])
     }
 
     /// Where vertex `v` stands before split `i`, one of its chain.
@@ -253,7 +258,7 @@ impl Forest {
 
     /// [`Forest::place`] in the stored precision, appended to `out`.
     pub(crate) fn append_place(&self, pm: &ProgressiveMesh, v: u32, k: usize, out: &mut Positions) {
-        let (from, i) = self.stored(pm, v, k);
+        let (from, i) = self.stored(pm, v, &self.chain(v)[..k]);
         match (from, out) {
             (Positions::F32(a), Positions::F32(b)) => b.push(a[i]),
             (Positions::F64(a), Positions::F64(b)) => b.push(a[i]),

@@ -223,7 +223,8 @@ impl View {
             found.clear();
             for ((d, chains), _) in part.iter().zip(&chains).zip(lasts).filter(|l| l.1) {
                 let turn = chains[1].iter().position(|&i| i >= d.made).unwrap_or(0);
-                entries.push(Entry::after(h, d.made, h.mesh().splits.vertex[d.made as usize], turn));
+                let v = h.mesh().splits.vertex[d.made as usize];
+                entries.push(Entry::after(h, d.made, v, &chains[1][..turn]));
             }
             last.look(&entries, &mut found);
             let kept = looks.iter_mut().zip(lasts).filter(|l| l.1);
@@ -236,7 +237,8 @@ impl View {
                     && let Some(&i) = chains[0].get(turn)
                 {
                     *open = true;
-                    entries.push(Entry::after(h, i, self.front.vertex_of_record(d.record), turn));
+                    let v = self.front.vertex_of_record(d.record);
+                    entries.push(Entry::after(h, i, v, &chains[0][..turn]));
                 }
             }
             next.look(&entries, &mut found);

@@ -19,10 +19,10 @@ impl Entry {
         Entry::placed(h, i, h.local_centre(i))
     }
 
-    /// Of the split of vertex `v` that comes after the first `k` of its chain, and is `i`.
+    /// Of split `i` of vertex `v`, which comes after those of its chain that are given.
     #[inline]
-    pub(super) fn after(h: &Hierarchy, i: u32, v: u32, k: usize) -> Entry {
-        Entry::at(h, i, h.forest.place(h.mesh(), v, k))
+    pub(super) fn after(h: &Hierarchy, i: u32, v: u32, before: &[u32]) -> Entry {
+        Entry::at(h, i, h.forest.place_after(h.mesh(), v, before))
     }
 
     /// Of split `i`, of a vertex that stands there.
