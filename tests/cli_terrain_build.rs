@@ -216,5 +216,9 @@ fn what_cannot_be_built_is_said() {
         .failed(3, "nothing to triangulate");
     p.write("high.raw", (0..100).flat_map(|i| (1e30 + f64::from(i)).to_le_bytes()).collect::<Vec<_>>());
     p.run("terrain build high.raw a.pm --size 10x10 --type f64 --floor 1").failed(3, "finer than f32");
+    p.write("cut.raw", (0..100).flat_map(|i| (1.0 / f64::from(i)).to_le_bytes()).collect::<Vec<_>>());
+    p.run("terrain build cut.raw a.pm --size 10x10 --type f64").failed(3, "infinite");
+    // Nothing is left where nothing can be gone on with.
+    assert!(p.files().iter().all(|f| !f.contains("a.pm")), "{:?}", p.files());
     p.done("terrain build high.raw a.pm --size 10x10 --type f64 -q");
 }

@@ -571,7 +571,10 @@ impl WorkFolder {
         fs::remove_dir(&self.path)
     }
 
-    fn clear(&self) -> io::Result<()> {
+    /// Removes all that was put there.
+    ///
+    /// Errors: the system's.
+    pub fn clear(&self) -> io::Result<()> {
         self.clear_temporary()?;
         self.clear_by(|name| [".block", ".sheet", ".chunks"].iter().any(|end| name.ends_with(end)))?;
         self.clear_by(|name| name == BELONGS)
@@ -589,6 +592,19 @@ impl WorkFolder {
             }
         }
         Ok(())
+    }
+}
+
+/// A folder without work is of no use to the next run: it goes.
+impl Drop for WorkFolder {
+    fn drop(&mut self) {
+        let empty = fs::read_dir(&self.path)
+            .is_ok_and(|all| all.into_iter().all(|e| e.is_ok_and(|e| e.file_name() == BELONGS)));
+        if empty {
+            // What cannot be removed stays.
+            let _ = fs::remove_file(self.path.join(BELONGS));
+            let _ = fs::remove_dir(&self.path);
+        }
     }
 }
 

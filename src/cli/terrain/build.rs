@@ -101,7 +101,13 @@ impl Args {
                 .with_spacing(spacing(&source));
             let progress = Progress::new(&interrupt, self.ending.quiet, "building");
             let watch = Watch(&progress);
-            let failed = |e: &BuildError| failure(&file, &out, &path, self.ending.quiet, e);
+            let failed = |e: &BuildError| {
+                // What no other run could use either.
+                if matches!(e, BuildError::Nothing | BuildError::TooLarge(_)) {
+                    let _ = folder.clear();
+                }
+                failure(&file, &out, &path, self.ending.quiet, e)
+            };
             let building = Instant::now();
             let blocks =
                 blocks::blocks(&*source.raster, &options, &folder, &watch).map_err(|e| failed(&e))?;
