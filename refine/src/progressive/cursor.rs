@@ -105,6 +105,9 @@ impl Lineage {
     }
 }
 
+/// Faces that a split hands to its new vertex, as far as they are noted on the way to its right cut.
+const RUN: usize = 8;
+
 /// What a [`Patch`] needs, while one is made.
 #[derive(Clone, Debug, Default)]
 struct Touched {
@@ -335,7 +338,16 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
             return Err(Damage::Reference { what: "split", at: i, to: vs });
         }
         let code = pm.splits.code[i];
-        let gap = self.fans.find_gap(i, (pm.splits.left[i], pm.splits.right[i]), code)?;
+        // Walked once, as far as they are few; nearly always.
+        let mut run = [Half::new(0, 0, false); RUN];
+        let mut known = 0;
+        let cuts = (pm.splits.left[i], pm.splits.right[i]);
+        let gap = self.fans.find_gap_and_tell(i, cuts, code, |h| {
+            if let Some(to) = run.get_mut(known) {
+                *to = h;
+                known += 1;
+            }
+        })?;
         let Some(seen_from) = gap.left.inner.or(gap.left.outer) else { return Err(Damage::Fan(i)) };
         let wedge = |h: Half| self.fans.wedge(h);
         let first = wedge(seen_from);
@@ -416,6 +428,7 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
         let mut unseen = None;
         let seen = self.touched.as_mut().map_or(&mut unseen, |t| &mut t.indices);
         match code.kind() {
+            SplitKind::Plain if gap.faces == known => self.fans.hand_over_run(&run[..known], |_| w, seen),
             SplitKind::Plain => self.fans.hand_over(gap.left.inner, gap.faces, |_| w, seen),
             SplitKind::Seam => {
                 let map = |c: u32| if c == x[0] { w } else { w + 1 };
@@ -462,22 +475,21 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
             };
             explicit = (0..=new).rev().find_map(read).unwrap_or_default();
         }
-        let run = self.fans.run_length(left.inner, fl);
         let mut unseen = None;
         let seen = self.touched.as_mut().map_or(&mut unseen, |t| &mut t.indices);
         let chosen = [x_l, x_r];
         let (new, changed): (usize, &[u32]) = match code.kind() {
             SplitKind::Plain => {
-                self.fans.hand_over(left.inner, run, |_| x_l, seen);
+                self.fans.hand_over_before(left.inner, fl, |_| x_l, seen);
                 (1, &chosen[..1])
             }
             SplitKind::Seam => {
-                self.fans.hand_over(left.inner, run, |c| if c == y_l { x_l } else { x_r }, seen);
+                self.fans.hand_over_before(left.inner, fl, |c| if c == y_l { x_l } else { x_r }, seen);
                 (2, &chosen)
             }
             SplitKind::Explicit => {
                 let map = |c: u32| explicit.pairs.iter().find(|p| p.1 == c).map_or(c, |p| p.0);
-                self.fans.hand_over(left.inner, run, map, seen);
+                self.fans.hand_over_before(left.inner, fl, map, seen);
                 (explicit.new, &explicit.changed)
             }
         };

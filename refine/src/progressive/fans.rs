@@ -51,11 +51,18 @@ impl Fans {
     ///
     /// Errors: cuts that are no edges, or of different fans.
     #[inline]
-    pub(crate) fn find_gap(
+    pub(crate) fn find_gap(&self, i: usize, cuts: (u32, u32), code: SplitCode) -> Result<Gap, Damage> {
+        self.find_gap_and_tell(i, cuts, code, |_| ())
+    }
+
+    /// The same; `tell` is given the faces that go to the new vertex, each by the edge by which it is entered, in turn.
+    #[inline]
+    pub(crate) fn find_gap_and_tell(
         &self,
         i: usize,
         (cut, right): (u32, u32),
         code: SplitCode,
+        mut tell: impl FnMut(Half),
     ) -> Result<Gap, Damage> {
         let count = self.corners.len() as u32;
         let two = code.two_faces();
@@ -74,6 +81,7 @@ impl Fans {
         let mut gap = Gap { left, ..Gap::default() };
         let mut entry = left.inner;
         while let Some(h) = entry {
+            tell(h);
             let exit = h.turn();
             let outer = self.across(exit);
             gap.right = Opening { inner: Some(exit), outer };
@@ -108,13 +116,45 @@ impl Fans {
         let mut entry = first;
         for _ in 0..count {
             let Some(h) = entry else { return };
-            let c = h.corner();
-            let wedge = &mut self.corners[h.face() as usize][c];
-            *wedge = map(*wedge);
-            if let Some(seen) = seen {
-                seen.push(3 * h.face() + c as u32);
-            }
+            self.give(h, &map, seen);
             entry = self.across(h.turn());
+        }
+    }
+
+    /// The same for these faces.
+    #[inline]
+    pub(crate) fn hand_over_run(
+        &mut self,
+        run: &[Half],
+        map: impl Fn(u32) -> u32,
+        seen: &mut Option<Vec<u32>>,
+    ) {
+        run.iter().for_each(|&h| self.give(h, &map, seen));
+    }
+
+    /// The same for the faces from `first` on, up to one that is not below `end`, or a border.
+    #[inline]
+    pub(crate) fn hand_over_before(
+        &mut self,
+        first: Option<Half>,
+        end: u32,
+        map: impl Fn(u32) -> u32,
+        seen: &mut Option<Vec<u32>>,
+    ) {
+        let mut entry = first;
+        while let Some(h) = entry.filter(|h| h.face() < end) {
+            self.give(h, &map, seen);
+            entry = self.across(h.turn());
+        }
+    }
+
+    #[inline]
+    fn give(&mut self, h: Half, map: impl Fn(u32) -> u32, seen: &mut Option<Vec<u32>>) {
+        let c = h.corner();
+        let wedge = &mut self.corners[h.face() as usize][c];
+        *wedge = map(*wedge);
+        if let Some(seen) = seen {
+            seen.push(3 * h.face() + c as u32);
         }
     }
 
@@ -184,17 +224,6 @@ impl Fans {
         let c = &self.corners[f as usize];
         let (b, d) = (c[next(a)], c[previous(a)]);
         if vu_next { (d, b) } else { (b, d) }
-    }
-
-    /// How many faces of a vertex follow from `first` before one that is not below `end`, or a border.
-    #[inline]
-    pub(crate) fn run_length(&self, first: Option<Half>, end: u32) -> usize {
-        let (mut entry, mut count) = (first, 0);
-        while let Some(h) = entry.filter(|h| h.face() < end) {
-            count += 1;
-            entry = self.across(h.turn());
-        }
-        count
     }
 
     /// Closes an opening whose face is going.
