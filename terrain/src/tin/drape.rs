@@ -16,7 +16,12 @@ const END: f64 = 0.125;
 pub fn drape(grid: &Grid, lines: &[Line], error: f64) -> Vec<Line> {
     let mut out = Vec::with_capacity(lines.len());
     let mut pieces = vec![];
+    let inside = |p: &[u32; 2]| (p[0] as usize) < grid.columns() && (p[1] as usize) < grid.rows();
     for &[a, b] in lines {
+        if ![a, b].iter().all(inside) {
+            out.push([a, b]);
+            continue;
+        }
         // The longer way goes along columns or along rows.
         let k = usize::from(a[0].abs_diff(b[0]) < a[1].abs_diff(b[1]));
         let [p, q, r, s] = [a[k], b[k], a[1 - k], b[1 - k]].map(f64::from);
@@ -149,6 +154,10 @@ mod tests {
         let shore = Grid::new(9, 9, heights.collect()).unwrap();
         let pieces = drape(&shore, &[[[0, 1], [8, 1]]], 1.0);
         assert!(pieces.contains(&[[4, 1], [8, 1]]), "{pieces:?}");
-        assert_eq!(drape(&plane, &[[[0, 0], [99, 99]]], 0.0), [[[0, 0], [99, 99]]], "beyond the grid");
+        assert_eq!(
+            drape(&plane, &[[[0, 0], [u32::MAX, 99]]], 0.0),
+            [[[0, 0], [u32::MAX, 99]]],
+            "beyond the grid"
+        );
     }
 }
