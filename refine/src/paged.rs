@@ -16,6 +16,7 @@
 
 mod adapt;
 mod front;
+mod list;
 mod output;
 mod page;
 mod shelf;
@@ -27,9 +28,10 @@ pub use shelf::Traffic;
 use crate::aif::NONE;
 use crate::format::{ByteRanges, FormatError, RangeReader};
 use crate::progressive::{Damage, Fans};
-use crate::selective::{Clock, Cull, Entry, Followed, Lens, LensError, Motions};
+use crate::selective::{Clocks, Cull, Entry, Followed, Lens, LensError, Motions};
 use crate::view::Camera;
 use glam::{DMat4, DVec3};
+use list::{List, Open};
 use shelf::Shelf;
 use std::sync::Arc;
 use timed::{CHANGE, MOTION};
@@ -57,16 +59,6 @@ pub enum PagedError {
         /// Bytes.
         needed: usize,
     },
-}
-
-/// A split that may come next, or may be undone next.
-#[derive(Clone, Copy, Debug)]
-struct Open {
-    entry: Entry,
-    /// The node it replaces.
-    node: u32,
-    /// When to look at it again.
-    due: u16,
 }
 
 /// A mesh of a file between base and full detail, finer where a view needs it, whose parts are read when they are needed.
@@ -102,14 +94,14 @@ pub struct PagedView<S> {
     /// Bytes that the caller takes for every vertex shown.
     beside: usize,
     /// Splits that could be applied next: what replaces nodes in the mesh. Their pages may not be there.
-    open: Vec<Open>,
+    open: List,
     /// Splits that could be undone next.
-    last: Vec<Open>,
+    last: List,
     /// Needed splits, the most urgent on top; empty between frames.
     queue: std::collections::BinaryHeap<(u16, std::cmp::Reverse<u32>)>,
     closure: Vec<u32>,
     resume: [usize; 2],
-    clock: Clock,
+    clock: Clocks,
     /// The last frame did not look at all that was due.
     cut: bool,
     limit: usize,
@@ -122,7 +114,7 @@ impl<S: ByteRanges> PagedView<S> {
     pub fn new(reader: Arc<RangeReader<S>>, m: u32, limit: usize) -> Result<Self, PagedError> {
         let (shelf, fans) = Shelf::new(reader, m)?;
         let (vertices, faces) = (shelf.base.vertices(), fans.corners.len());
-        let clock = Clock::new(shelf.base.links.diagonal);
+        let clock = Clocks::new(shelf.base.links.diagonal);
         let mut view = PagedView {
             shelf,
             face_in: (0..faces as u32).collect(),
@@ -141,8 +133,8 @@ impl<S: ByteRanges> PagedView<S> {
             at_once: false,
             jumped: Followed::default(),
             beside: 0,
-            open: Vec::new(),
-            last: Vec::new(),
+            open: List::default(),
+            last: List::default(),
             queue: Default::default(),
             closure: Vec::new(),
             resume: [0; 2],
@@ -150,7 +142,7 @@ impl<S: ByteRanges> PagedView<S> {
             cut: false,
             limit,
         };
-        view.open.reserve_exact(vertices);
+        view.open.reserve_to(vertices);
         let needed = view.bytes() + view.shelf.most_at_once();
         if needed > limit {
             return Err(PagedError::Memory { limit, needed });
@@ -249,7 +241,8 @@ impl<S: ByteRanges> PagedView<S> {
             + 28 * self.fans.corners.capacity()
             + 4 * self.free.capacity()
             + 8 * self.touched.capacity()
-            + size_of::<Open>() * (self.open.capacity() + self.last.capacity())
+            + self.open.bytes()
+            + self.last.bytes()
             + 8 * self.queue.capacity()
             + 4 * self.closure.capacity()
             + MOTION * self.motions.as_ref().map_or(0, Motions::len)
@@ -263,7 +256,8 @@ impl<S: ByteRanges> PagedView<S> {
         28 * self.fans.corners.capacity()
             + 4 * self.free.capacity()
             + 8 * self.touched.capacity()
-            + size_of::<Open>() * (self.open.capacity() + self.last.capacity())
+            + self.open.bytes()
+            + self.last.bytes()
     }
 
     /// Pages that are there now.
@@ -302,11 +296,10 @@ impl<S: ByteRanges> PagedView<S> {
         let free = ask(slots.max(self.fans.corners.len()), self.free.capacity(), 0);
         let open = ask(self.shelf.base.vertices() + self.led + splits, self.open.capacity(), 0);
         let last = ask(self.led + splits, self.last.capacity(), 0);
-        let each = size_of::<Open>();
         let bytes = 28 * corners
             + 4 * free
             + corners / 8
-            + each * (open + last)
+            + List::ENTRY * (open + last)
             + self.beside * (self.pending + splits);
         let moving = if self.motions.is_some() && !self.at_once { CHANGE * splits } else { 0 };
         if bytes + moving > 0 && !self.make_room(bytes + moving) {
@@ -326,8 +319,8 @@ impl<S: ByteRanges> PagedView<S> {
             grow(&mut self.touched, corners.div_ceil(64));
         }
         grow(&mut self.free, free);
-        grow(&mut self.open, open);
-        grow(&mut self.last, last);
+        self.open.reserve_to(open);
+        self.last.reserve_to(last);
         true
     }
 
@@ -339,7 +332,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         let entry = Entry::new(next, self.shelf.local_centre(k)?, bounds);
         self.shelf.set_open_place(k, self.open.len() as u32);
-        self.open.push(Open { entry, node: k, due: self.clock.now() });
+        self.open.push(Open { entry, node: k }, self.clock.now());
         Ok(())
     }
 
@@ -350,8 +343,7 @@ impl<S: ByteRanges> PagedView<S> {
             return;
         }
         self.shelf.set_open_place(k, NONE);
-        self.open.swap_remove(at);
-        if let Some(moved) = self.open.get(at) {
+        if let Some(moved) = self.open.take_out(at) {
             self.shelf.set_open_place(moved.node, at as u32);
         }
     }
@@ -368,7 +360,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         let entry = Entry::new(i, self.shelf.local_centre(node)?, bounds);
         self.shelf.set_last_place(i, self.last.len() as u32);
-        self.last.push(Open { entry, node, due: self.clock.now() });
+        self.last.push(Open { entry, node }, self.clock.now());
         Ok(())
     }
 
@@ -378,8 +370,7 @@ impl<S: ByteRanges> PagedView<S> {
             return;
         }
         self.shelf.set_last_place(i, NONE);
-        self.last.swap_remove(at);
-        if let Some(moved) = self.last.get(at) {
+        if let Some(moved) = self.last.take_out(at) {
             let split = moved.entry.split;
             self.shelf.set_last_place(split, at as u32);
         }

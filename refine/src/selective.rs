@@ -35,7 +35,7 @@ pub(crate) use adapt::Meter;
 pub use adapt::{Done, Limits};
 pub use changes::Changes;
 pub(crate) use changes::take_runs;
-pub(crate) use clock::{Clock, Judges};
+pub(crate) use clock::{Clock, Clocks, Due, Judges};
 pub(crate) use cut::{Cut, morphed};
 pub(crate) use entry::Entry;
 pub(crate) use front::Front;

@@ -7,7 +7,7 @@ use super::{PagedError, PagedView};
 use crate::aif::NONE;
 use crate::format::ByteRanges;
 use crate::progressive::Damage;
-use crate::selective::{Clock, Done, Judges, Lens, Limits, Meter};
+use crate::selective::{Done, Judges, Lens, Limits, Meter};
 use std::cmp::Reverse;
 
 /// How far a frame may go.
@@ -118,16 +118,18 @@ impl<S: ByteRanges> PagedView<S> {
     fn coarsen(&mut self, judges: &Judges<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
         let (mut at, whole) = start(self.resume[0], self.last.len());
         let mut stack = Vec::new();
-        while at > 0 && frame.meter.goes_on() {
-            at = (at - 1).min(self.last.len().saturating_sub(1));
-            let Some(o) = self.last.get_mut(at) else { break };
-            if !all && !Clock::has_come(self.clock.now(), o.due) {
-                continue;
+        loop {
+            // Undoing takes out of the list.
+            at = self.last.next_due(at, all, &self.clock);
+            if at == 0 || !frame.meter.goes_on() {
+                break;
             }
+            at -= 1;
+            let Some(o) = self.last.get(at) else { break };
             frame.meter.looks += 1;
-            let verdict = judges.of_last(&o.entry, &self.clock);
-            if verdict.wanted {
-                o.due = self.clock.due(verdict.slack, o.entry.split);
+            let (wanted, due) = self.clock.of_last(judges, &o.entry);
+            if wanted {
+                self.last.set_due(at, due);
                 continue;
             }
             stack.push(o.entry.split);
@@ -154,21 +156,22 @@ impl<S: ByteRanges> PagedView<S> {
 
     fn refine(&mut self, judges: &Judges<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
         let (mut at, whole) = start(self.resume[1], self.open.len());
-        while at > 0 && frame.meter.goes_on() {
+        loop {
+            at = self.open.next_due(at, all, &self.clock);
+            if at == 0 || !frame.meter.goes_on() {
+                break;
+            }
             at -= 1;
             let now = self.clock.now();
-            let Some(o) = self.open.get_mut(at) else { break };
-            if !all && !Clock::has_come(now, o.due) {
-                continue;
-            }
+            let Some(&o) = self.open.get(at) else { break };
             frame.meter.looks += 1;
-            let verdict = judges.of_next(&o.entry, &self.clock);
-            if !verdict.wanted {
-                o.due = self.clock.due(verdict.slack, o.entry.split);
+            let (wanted, due) = self.clock.of_next(judges, &o.entry);
+            if !wanted {
+                self.open.set_due(at, due);
                 continue;
             }
             // Until it is applied.
-            o.due = now;
+            self.open.set_due(at, now);
             let (split, rank) = (o.entry.split, judges.rank(&o.entry));
             self.enqueue(rank, split, frame);
         }
@@ -307,7 +310,7 @@ impl<S: ByteRanges> PagedView<S> {
         if self.motions.is_none() {
             self.split_faces(i)?;
         }
-        self.lead(i, true);
+        self.lead(i, needs, true);
         self.withdraw(node);
         for d in needs.into_iter().filter(|&d| d != NONE) {
             self.hold_split(d);
@@ -331,7 +334,7 @@ impl<S: ByteRanges> PagedView<S> {
         } else if !self.at_once && !self.make_room(CHANGE) {
             self.jump();
         }
-        self.lead(i, false);
+        self.lead(i, needs, false);
         self.offer(node)?;
         for d in needs {
             if d != NONE && self.is_free(d) {

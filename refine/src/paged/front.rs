@@ -52,8 +52,9 @@ impl<S: ByteRanges> PagedView<S> {
         if self.shelf.node(s.vertex) != parent {
             return Err(Damage::Fan(at).into());
         }
+        let mut needs = [NONE; 3];
         if self.motions.is_some() {
-            self.can_count(i, |p| &p.holders)?;
+            needs = self.can_count(i, |p| &p.holders)?;
         }
         let right = if s.code.two_faces() { self.cut(i, right)? } else { NONE };
         let cuts = (self.cut(i, left)?, right);
@@ -68,7 +69,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         if self.motions.is_some() {
             self.pending -= usize::from(self.shelf.is_led(i));
-            self.count(i, |p| &mut p.holders, 1);
+            self.count(needs, |p| &mut p.holders, 1);
         }
         Ok(())
     }
@@ -83,9 +84,9 @@ impl<S: ByteRanges> PagedView<S> {
         }
     }
 
-    /// Adds `by` to what is counted of all that split `i` depends on.
-    fn count(&mut self, i: u32, of: impl Fn(&mut Page) -> &mut Vec<u8>, by: i8) {
-        for d in self.shelf.needs(i).into_iter().flatten().filter(|&d| d != NONE) {
+    /// Adds `by` to what is counted of these splits.
+    fn count(&mut self, splits: [u32; 3], of: impl Fn(&mut Page) -> &mut Vec<u8>, by: i8) {
+        for d in splits.into_iter().filter(|&d| d != NONE) {
             if let Some((p, k)) = self.shelf.page_mut(d) {
                 let n = &mut of(p)[k];
                 *n = n.wrapping_add_signed(by);
@@ -93,8 +94,8 @@ impl<S: ByteRanges> PagedView<S> {
         }
     }
 
-    /// Split `i` is asked for now, or no longer. What it depends on can have one more.
-    pub(super) fn lead(&mut self, i: u32, on: bool) {
+    /// Split `i`, which depends on `needs`, is asked for now, or no longer. Those can have one more that depends on them.
+    pub(super) fn lead(&mut self, i: u32, needs: [u32; 3], on: bool) {
         let (clock, timed) = (self.shelf.clock, self.motions.is_some());
         let mut drawn = true;
         let mut faces = 0;
@@ -107,7 +108,7 @@ impl<S: ByteRanges> PagedView<S> {
                 p.stamp = clock;
             }
         }
-        self.count(i, |p| &mut p.dependents, if on { 1 } else { -1 });
+        self.count(needs, |p| &mut p.dependents, if on { 1 } else { -1 });
         let pending = usize::from(timed && !drawn);
         if on {
             self.led += 1;
@@ -142,7 +143,8 @@ impl<S: ByteRanges> PagedView<S> {
             p.stamp = clock;
         }
         if self.motions.is_some() {
-            self.count(i, |p| &mut p.holders, -1);
+            let needs = self.shelf.needs(i).unwrap_or([NONE; 3]);
+            self.count(needs, |p| &mut p.holders, -1);
         }
         Ok(())
     }

@@ -35,7 +35,10 @@ struct ChunkAt {
     /// Its place in the directory.
     index: u32,
     first: u32,
+    first_face: u32,
     first_wedge: u32,
+    /// Splits before it that make one face only, and those behind its end.
+    singles: [u32; 2],
     /// The most that the page takes.
     most: usize,
     touched: bool,
@@ -145,7 +148,9 @@ impl<S: ByteRanges> Shelf<S> {
             chunks.push(ChunkAt {
                 index: c.index,
                 first: c.first,
+                first_face: head.first_face(c.first),
                 first_wedge: p.first_face,
+                singles: [c.first, c.first + c.count].map(|i| head.single.partition_point(|&s| s < i) as u32),
                 most: Page::most_bytes(c.raw, p.raw, c.count, faces, wedges),
                 touched: false,
             });
@@ -216,6 +221,34 @@ impl<S: ByteRanges> Shelf<S> {
             k += 1;
         }
         k
+    }
+
+    /// The chunk that makes face `f`, which there is; `None` of the base's.
+    #[inline]
+    fn chunk_of_face(&self, f: u32) -> Option<usize> {
+        let k = f.checked_sub(self.head.base_faces)?;
+        // Never behind it: splits make two faces at most.
+        let mut c = self.chunk_of(k / 2);
+        while self.chunks.get(c + 1).is_some_and(|c| c.first_face <= f) {
+            c += 1;
+        }
+        Some(c)
+    }
+
+    /// The split that makes face `f`, which there is; [`NONE`] of the base's. Most chunks have no splits that make one face only, or few.
+    #[inline]
+    fn maker_of_face(&self, f: u32) -> u32 {
+        let Some(c) = self.chunk_of_face(f) else { return NONE };
+        let k = f - self.head.base_faces;
+        let [from, to] = self.chunks.get(c).map_or([0; 2], |c| c.singles.map(|s| s as usize));
+        let singles = self.head.single.get(from..to).unwrap_or_default();
+        // Of those those whose face comes before.
+        let (mut low, mut high) = (0, singles.len());
+        while low < high {
+            let mid = (low + high) / 2;
+            if 2 * singles[mid] - ((from + mid) as u32) < k { low = mid + 1 } else { high = mid }
+        }
+        (k + (from + low) as u32) / 2
     }
 
     /// The page of split `i` if it is there, and the split's place in it.
@@ -365,7 +398,7 @@ impl<S: ByteRanges> Shelf<S> {
     pub(super) fn needs(&self, i: u32) -> Option<[u32; 3]> {
         let (p, k) = self.page(i)?;
         let maker = |cut: u32| {
-            if cut == NONE { NONE } else { self.head.maker(cut >> 2).map_or(NONE, |m| m.0) }
+            if cut == NONE { NONE } else { self.maker_of_face(cut >> 2) }
         };
         Some([self.maker(p.links.parent[k]), maker(p.left[k]), maker(p.right[k])])
     }
@@ -396,6 +429,10 @@ impl<S: ByteRanges> Shelf<S> {
         }
         if let Some(&own) = p.own.get(next.wrapping_sub(p.first) as usize) {
             return (next, own);
+        }
+        // Its page says the same: that is there mostly, and found sooner.
+        if let Some((there, k)) = self.page(next) {
+            return (next, there.own[k]);
         }
         match p.links.outside.binary_search_by_key(&next, |o| o.0) {
             Ok(at) => (next, p.links.outside[at].1),
@@ -459,18 +496,20 @@ impl<S: ByteRanges> Shelf<S> {
     /// The slot of face `f`; [`NONE`] if it is not in the mesh.
     #[inline]
     pub(super) fn slot_of(&self, f: u32) -> u32 {
-        match self.head.maker(f) {
+        match self.chunk_of_face(f) {
             None => self.base.slot.get(f as usize).copied().unwrap_or(NONE),
-            Some((i, _)) => self.page(i).map_or(NONE, |(p, _)| {
-                p.slot.get(f.wrapping_sub(p.first_face) as usize).copied().unwrap_or(NONE)
-            }),
+            Some(c) => {
+                self.pages.get(c).and_then(|p| p.as_deref()).map_or(NONE, |p| {
+                    p.slot.get(f.wrapping_sub(p.first_face) as usize).copied().unwrap_or(NONE)
+                })
+            }
         }
     }
 
     #[inline]
     pub(super) fn set_slot(&mut self, f: u32, slot: u32) {
-        if let Some((i, _)) = self.head.maker(f)
-            && let Some((p, _)) = self.page_mut(i)
+        if let Some(c) = self.chunk_of_face(f)
+            && let Some(p) = self.pages.get_mut(c).and_then(|p| p.as_deref_mut())
             && let Some(s) = p.slot.get_mut(f.wrapping_sub(p.first_face) as usize)
         {
             *s = slot;

@@ -10,6 +10,10 @@
 //! turning is a small motion for what is near. The clock takes the sum at `|p - o| = reach`; farther places divide their slack by how much farther they are. Distances from the eye and turned cones change by
 //! no more than the eye moves.
 
+mod near;
+
+pub(crate) use near::{Clocks, Due};
+
 use super::Lens;
 use super::entry::Entry;
 use super::lens::turned;
@@ -52,6 +56,8 @@ pub(super) struct Pace {
     pub(super) diagonal: f64,
     /// How much of the clock's distance a change of the tolerance by a factor of e is, if it may change; infinite if not: then any change begins anew.
     pub(super) per_tau: f64,
+    /// The part of the eye's way that motions are at least: [`EYE`], or all of it.
+    pub(super) eye: f64,
 }
 
 /// Adds up how far lenses move.
@@ -78,7 +84,7 @@ const ROUNDING: f64 = 1e-7;
 impl Pace {
     pub(super) fn of(lens: &Lens, diagonal: f64, per_tau: f64) -> Pace {
         let outside = !lens.perspective || lens.eye.length() > 0.5 * diagonal;
-        Pace { about: if outside { About::Middle } else { About::Eye }, diagonal, per_tau }
+        Pace { about: if outside { About::Middle } else { About::Eye }, diagonal, per_tau, eye: EYE }
     }
 
     /// The distance that motions are taken at.
@@ -129,7 +135,7 @@ impl Pace {
                 About::Eye => (o2 - o).length() + off.abs(),
             }
         };
-        let mut most = by_tau.max(EYE * (b.eye - a.eye).length());
+        let mut most = by_tau.max(self.eye * (b.eye - a.eye).length());
         if a.perspective {
             let depth = |l: &Lens| (l.gradient / l.steep, l.eye, 0.0);
             most = most.max(linear(depth(a), depth(b)));
@@ -149,7 +155,7 @@ impl Pace {
 impl Clock {
     /// Before the first lens.
     pub(crate) fn new(diagonal: f64) -> Clock {
-        let pace = Pace { about: About::Middle, diagonal, per_tau: f64::INFINITY };
+        let pace = Pace { about: About::Middle, diagonal, per_tau: f64::INFINITY, eye: EYE };
         Clock { lenses: Vec::new(), keep: 1.0, pace, now: 0 }
     }
 
@@ -200,10 +206,7 @@ impl Clock {
     /// When a decision that has this slack now is due; what is so late that time does not reach so far comes at times that differ by `salt`, or all would come at once.
     #[inline]
     pub(crate) fn due(&self, slack: f64, salt: u32) -> u16 {
-        let most = AHEAD - (salt.wrapping_mul(0x9e37_79b1) >> 18) as u16;
-        let steps = slack * SAFE / self.pace.diagonal * STEPS;
-        // NaN is 0.
-        self.now.wrapping_add(if steps >= most as f64 { most } else { steps as u16 })
+        time(self.now, &self.pace, slack, salt)
     }
 
     /// What never is, unless it is made so: it still must be looked at now and then, before the time comes round.
@@ -216,6 +219,15 @@ impl Clock {
     pub(crate) fn has_come(now: u16, due: u16) -> bool {
         due.wrapping_sub(now) as i16 <= 0
     }
+}
+
+/// As [`Clock::due`].
+#[inline]
+fn time(now: u16, pace: &Pace, slack: f64, salt: u32) -> u16 {
+    let most = AHEAD - (salt.wrapping_mul(0x9e37_79b1) >> 18) as u16;
+    let steps = slack * SAFE / pace.diagonal * STEPS;
+    // NaN is 0.
+    now.wrapping_add(if steps >= most as f64 { most } else { steps as u16 })
 }
 
 impl Lens {
@@ -245,7 +257,7 @@ impl Lens {
             if self.perspective {
                 let along = self.gradient.dot(line) - self.steep * radius;
                 let about = self.slant * (away - radius);
-                let speeds = [self.steep * far + grows, self.slant / EYE + grows, grows];
+                let speeds = [self.steep * far + grows, self.slant / pace.eye + grows, grows];
                 let depths = [along, about, self.near];
                 let above = |k: usize| {
                     let d = depths[k] - fine;
@@ -283,7 +295,7 @@ impl Lens {
         }
         if self.back {
             let (line, reach, speed) =
-                if self.perspective { (line, radius, EYE) } else { (self.look, 0.0, pace.reach()) };
+                if self.perspective { (line, radius, pace.eye) } else { (self.look, 0.0, pace.reach()) };
             // What looks the other way, or all ways, is as if turned by nothing.
             let above = turned(e, line, reach);
             let sure = |above: f64| (above.abs() - ROUNDING * (line.length() + reach)).max(0.0) * speed;
@@ -310,10 +322,10 @@ impl Lens {
         let (l, r) = (line.length(), radius);
         if l > r {
             let turns = 2.0 / ((l - r) * (l + 3.0 * r)).sqrt();
-            return (turns / EYE, 0.5 * (l - r) * EYE);
+            return (turns / pace.eye, 0.5 * (l - r) * pace.eye);
         }
         // In the sphere all counts.
-        (0.0, (r - l) * EYE)
+        (0.0, (r - l) * pace.eye)
     }
 
     /// How far the line of sight may move before a cone turns its back that looks the other way now, or all ways.
