@@ -32,11 +32,12 @@ mod write;
 
 pub use assembly::{Assembly, Decoded, Report, StreamSizes};
 pub use base::MeshHead;
+pub(crate) use codec::Room;
 pub use container::{Chunk, ChunkType, Directory, FormatError, MAGIC, VERSION};
 pub use lattice::suggested_grid;
 pub use places::Lattice;
-pub(crate) use read::read_piece;
 pub use read::{ByteRanges, Piece, PmReader, RangeReader, decode, decode_prefix};
+pub(crate) use read::{CONTRADICTS, read_piece, read_piece_within};
 pub use splits::SplitBlock;
 pub use write::{EncodeError, EncodeOptions, encode};
 

@@ -28,7 +28,7 @@ pub use shelf::Traffic;
 use crate::aif::NONE;
 use crate::format::{ByteRanges, FormatError, RangeReader};
 use crate::progressive::{Damage, Fans};
-use crate::selective::{Clocks, Cull, Entry, Followed, Lens, LensError, Motions};
+use crate::selective::{Clocks, Cull, Due, Entry, Followed, Lens, LensError, Motions};
 use crate::view::Camera;
 use glam::{DMat4, DVec3};
 use list::{List, Open};
@@ -332,7 +332,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         let entry = Entry::new(next, self.shelf.local_centre(k)?, bounds);
         self.shelf.set_open_place(k, self.open.len() as u32);
-        self.open.push(Open { entry, node: k }, self.clock.now());
+        self.open.push(Open { entry, node: k }, Due::NOW);
         Ok(())
     }
 
@@ -360,7 +360,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         let entry = Entry::new(i, self.shelf.local_centre(node)?, bounds);
         self.shelf.set_last_place(i, self.last.len() as u32);
-        self.last.push(Open { entry, node }, self.clock.now());
+        self.last.push(Open { entry, node }, Due::NOW);
         Ok(())
     }
 

@@ -88,7 +88,7 @@ impl Part {
             none => none.insert(Sequel::new(&self.head, self.head.start.take()?)),
         };
         let at = (chunk.first, chunk.first_face);
-        codec::read(&self.head, state, false, at, (chunk.count as usize, chunk.raw), bytes)
+        codec::read(&self.head, state, None, at, (chunk.count as usize, chunk.raw), bytes)
     }
 }
 

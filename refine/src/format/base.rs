@@ -39,7 +39,7 @@ pub struct MeshHead {
     /// Faces at full detail of which quantising put two corners at one place.
     pub flat_faces: u32,
     /// The base, for those who read chunks alone.
-    pub(super) start: Start,
+    pub(crate) start: Start,
 }
 
 const DOUBLE: u8 = 1;

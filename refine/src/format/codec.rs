@@ -240,18 +240,72 @@ pub(super) fn write(
     Some(out)
 }
 
-/// Reads a chunk before which `state` stands; if it is read alone, at the base. `None`: damage, and the state is void.
+/// What reading a chunk alone may take on the way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Room {
+    /// Splits of its context.
+    context: u64,
+    /// Edges of a ring.
+    ring: usize,
+}
+
+impl Room {
+    /// Bytes of the mesh before the first split, which is kept ready for all chunks.
+    pub(crate) fn base_bytes(head: &MeshHead) -> u64 {
+        let all = Walk::bytes(head.base_vertices.into(), head.base_faces.into(), head.double);
+        u64::try_from(all).unwrap_or(u64::MAX)
+    }
+
+    /// As much as there is.
+    pub(crate) const ANY: Room = Room { context: u64::MAX, ring: usize::MAX };
+
+    /// What chunks of so many splits take: on two terrains, igea and dragon contexts have at most 1.01 times as many splits as their chunks, and rings some ten edges.
+    pub(crate) fn usual(count: u32) -> Room {
+        Room { context: count as u64 + count as u64 / 8 + 512, ring: 1024 }
+    }
+
+    /// Bytes that reading takes at most on the way, besides the arrays that come of it and what `chunk` has in the file: all that grows is here with what it grows to, and what it grew from while that is copied.
+    pub(crate) fn bytes(self, head: &MeshHead, chunk: &super::Chunk) -> u64 {
+        const GROWN: u128 = 3;
+        // What a directory says may be anything.
+        let [count, stored, raw] = [chunk.count.into(), chunk.stored.into(), chunk.raw.into()];
+        // The format allows as many splits of a context as bytes.
+        let context = u128::from(self.context).min(stored);
+        let (n0, f0) = (u128::from(head.base_vertices), u128::from(head.base_faces));
+        let splits: u128 = count + context;
+        let (vertices, faces) = (n0 + splits, f0 + 2 * splits);
+        // There is room for usual contexts at once.
+        let growth = if context > Room::usual(chunk.count).context.into() { GROWN } else { 1 };
+        let walk = growth * Walk::bytes(vertices, faces, head.double) + GROWN * 2 * 4 * (n0 + f0 + 128);
+        let edges = (2 * faces + 2).min(self.ring as u128 + 64);
+        let ring = 2 * GROWN * size_of::<super::walk::Edge>() as u128 * edges;
+        let known = GROWN * 12 * context;
+        // Two sweeps, and roots with their labels: of the context's splits or the chunk's.
+        let sweeps = GROWN * (2 * 2 * 4 + 16) * context.max(count);
+        // Of arrays that no room is made for at once; rows are kept by vertex.
+        let plain = count * (18 + if head.double { 24 } else { 12 });
+        let grows = if raw == plain { 0 } else { GROWN * raw };
+        let rows = if head.channels.is_some() { GROWN * (raw + 32 * count) } else { 0 };
+        let all = walk + ring + known + sweeps + grows + rows + FIXED;
+        u64::try_from(all).unwrap_or(u64::MAX)
+    }
+}
+
+/// Bytes of models of symbols and other things that do not grow, at most.
+const FIXED: u128 = 1 << 18;
+
+/// Reads a chunk before which `state` stands; if it is read alone, at the base, with the room that is given. `None`: damage, or too little room; the state is void.
 pub(super) fn read(
     head: &MeshHead,
     state: &mut Sequel,
-    alone: bool,
+    alone: Option<Room>,
     (first, first_face): (u32, u32),
     (count, raw): (usize, u64),
     mut bytes: &[u8],
 ) -> Option<SplitBlock> {
     let stored = bytes.len() as u64;
     let end = (first as u64).checked_add(count as u64)?;
-    let here = alone || head.base_vertices as usize + first as usize == state.walk.vertices.len();
+    let here = alone.is_some() || head.base_vertices as usize + first as usize == state.walk.vertices.len();
     if end > head.splits as u64 || !here || first_face != head.first_face(first) {
         return None;
     }
@@ -283,10 +337,13 @@ pub(super) fn read(
         return None;
     }
     out.reserve(count);
-    state.walk.reserve(count);
-    let mut codec = Codec::new(head, state, at, alone);
-    if alone {
-        codec.context(&mut streams, &ProgressiveMesh::default(), None, stored)?;
+    let usual = Room::usual(count as u32).context.min(stored) as usize;
+    state.walk.reserve(count + if alone.is_some() { usual } else { 0 });
+    let mut codec = Codec::new(head, state, at, alone.is_some());
+    codec.extras.limit(raw);
+    if let Some(room) = alone {
+        codec.ring.most = room.ring;
+        codec.context(&mut streams, &ProgressiveMesh::default(), None, room.context.min(stored))?;
     }
     codec.prepares(false);
     codec.levels(&mut streams[ERRORS], [0; 2]);

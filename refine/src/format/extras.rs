@@ -17,6 +17,8 @@ pub(super) struct Extras {
     face_same: [Bit; 2],
     face_value: [Number; 2],
     face_last: [u32; 2],
+    /// Numbers of lists and rows that there can be (reader).
+    most: u64,
 }
 
 impl Extras {
@@ -30,7 +32,13 @@ impl Extras {
             face_same: Default::default(),
             face_value: Default::default(),
             face_last: [NONE; 2],
+            most: u64::MAX,
         }
+    }
+
+    /// A reader's arrays are to take at most so many bytes: lists and rows that would take more are damage, and none of them is made.
+    pub(super) fn limit(&mut self, raw: u64) {
+        self.most = raw / 4;
     }
 
     /// Codes what belongs to the next split, and moves `source` behind it.
@@ -112,12 +120,16 @@ impl Extras {
                 let pairs = c.number(&mut self.explicit[0], next() as u64);
                 let listed = c.number(&mut self.explicit[1], next() as u64);
                 let start = out.explicit.len();
+                let tips = 3 + 3 * code.two_faces() as u64;
+                let ids = pairs.checked_mul(2)?.checked_add(listed)?.checked_add(tips)?;
                 if C::READS {
+                    if ids > self.most.saturating_sub(start as u64) {
+                        return None;
+                    }
                     out.explicit.extend([u32::try_from(pairs).ok()?, u32::try_from(listed).ok()?]);
                 }
                 new = 0;
-                let tips = 3 + 3 * code.two_faces() as u64;
-                for k in 0..pairs.checked_mul(2)?.checked_add(listed)?.checked_add(tips)? {
+                for k in 0..ids {
                     let (m, flag) = match k {
                         _ if k >= 2 * pairs + listed => (4 + ((k - 2 * pairs - listed) % 3 == 2) as usize, 2),
                         _ if k >= 2 * pairs => (3, 1),
@@ -148,7 +160,16 @@ impl Extras {
                 }
             }
         }
-        for k in 0..new.checked_add(changed)? {
+        let all = new.checked_add(changed)?;
+        if C::READS {
+            // Two for what is present, and the values.
+            let each = 2 + rows.row().len() as u64;
+            let there = out.rows.len() as u64 + 2 * out.present.len() as u64;
+            if (all as u64).checked_mul(each)? > self.most.saturating_sub(there) {
+                return None;
+            }
+        }
+        for k in 0..all {
             let row = source.as_ref().and_then(|s| {
                 let w = s.pm.wedges.as_ref()?;
                 let r = s.at.row + k;
@@ -165,5 +186,43 @@ impl Extras {
         }
         self.next_wedge += new;
         Some((new, changed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::coder::{Decoder, Encoder};
+    use super::*;
+    use crate::aif::{Channel, Encoding, Semantic};
+
+    /// A few bytes can say that hundreds of thousands of numbers follow, as what is foreseen costs next to nothing: none are made beyond what the directory announced.
+    #[test]
+    fn lists_take_no_more_than_was_announced() {
+        let head = MeshHead {
+            channels: Some(vec![Channel { semantic: Semantic::Normal, width: 3, encoding: Encoding::F32 }]),
+            ..MeshHead::default()
+        };
+        let (pairs, code) = (300_000u64, SplitCode(2 << SplitCode::KIND));
+        assert_eq!(code.kind(), SplitKind::Explicit);
+        let mut e = Encoder::default();
+        let mut models = Extras::new(&head, 0);
+        e.number(&mut models.explicit[0], pairs);
+        e.number(&mut models.explicit[1], 0);
+        for k in 0..2 * pairs + 3 {
+            e.bit(&mut models.none[if k < 2 * pairs { 0 } else { 2 }], true);
+        }
+        let mut bytes = Vec::new();
+        e.finish(&mut bytes);
+        assert!(bytes.len() < 3000, "{}", bytes.len());
+        for (raw, fits) in [(4 * (2 * pairs + 5), true), (1 << 16, false)] {
+            let mut extras = Extras::new(&head, 0);
+            extras.limit(raw);
+            let mut out = SplitBlock::default();
+            let mut d = [(); 2].map(|()| Decoder::new(&bytes).unwrap());
+            let [a, b] = &mut d;
+            let done = extras.code((a, b), (0, code), &mut None, &mut out);
+            assert_eq!(done.is_some(), fits, "{raw}");
+            assert!(4 * out.explicit.len() as u64 <= raw);
+        }
     }
 }

@@ -40,6 +40,13 @@ pub(crate) const OUTSIDE: u64 = 12;
 const BASE: u64 = 32;
 const VERTEX: u64 = 12;
 
+/// Bytes that reading the `PAGE` of so many splits takes at most on the way, besides what comes of it: the list of splits of later chunks grows, and has what it grew from beside it;
+/// a table of vertices, and the nodes made.
+pub(crate) fn scratch(count: u32, raw: u64) -> u64 {
+    let count = count as u64;
+    2 * raw.saturating_sub(SPLIT * count) + 48 * count + (1 << 14)
+}
+
 /// Models of one chunk.
 #[derive(Default)]
 struct Codec {

@@ -3,7 +3,7 @@
 use super::assembly::{Assembly, Decoded, StreamSizes};
 use super::base::{self, MeshHead};
 use super::bounds;
-use super::codec::{self, Sequel};
+use super::codec::{self, Room, Sequel};
 use super::container::{Chunk, ChunkType, Directory, FormatError, HEAD};
 use super::splits::SplitBlock;
 use crate::hierarchy::Bounds;
@@ -31,10 +31,23 @@ pub enum Piece {
     Other(Vec<u8>),
 }
 
+/// What is said of contents that the checksum is right for and that are wrong all the same.
+pub(crate) const CONTRADICTS: &str = "its contents contradict each other";
+
 /// Reads one chunk, whose bytes are given. `head` is that of its mesh; only chunks of splits need it.
 pub(crate) fn read_piece(chunk: &Chunk, head: Option<&MeshHead>, bytes: &[u8]) -> Result<Piece, FormatError> {
+    read_piece_within(chunk, head, bytes, Room::ANY)
+}
+
+/// The same with no more room for what a chunk of splits takes on the way.
+pub(crate) fn read_piece_within(
+    chunk: &Chunk,
+    head: Option<&MeshHead>,
+    bytes: &[u8],
+    room: Room,
+) -> Result<Piece, FormatError> {
     chunk.check(bytes)?;
-    let damaged = || chunk.damage("its contents contradict each other");
+    let damaged = || chunk.damage(CONTRADICTS);
     match chunk.kind {
         ChunkType::BASE => {
             let (head, pm) = base::read(bytes, chunk.raw)
@@ -46,7 +59,8 @@ pub(crate) fn read_piece(chunk: &Chunk, head: Option<&MeshHead>, bytes: &[u8]) -
             let head = head.ok_or_else(|| chunk.damage("the base of its mesh is not known"))?;
             let at = (chunk.first, chunk.first_face);
             let mut state = Sequel::new(head, head.start.take().ok_or_else(damaged)?);
-            let block = codec::read(head, &mut state, true, at, (chunk.count as usize, chunk.raw), bytes);
+            let block =
+                codec::read(head, &mut state, Some(room), at, (chunk.count as usize, chunk.raw), bytes);
             head.start.give(state);
             Ok(Piece::Splits(Box::new(block.ok_or_else(damaged)?)))
         }

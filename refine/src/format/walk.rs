@@ -96,11 +96,13 @@ pub(super) struct Ring {
     pub(super) closed: bool,
     /// The squares of all lengths, summed up in turn.
     pub(super) squares: f32,
+    /// The most edges that it is to have.
+    pub(super) most: usize,
 }
 
 impl Default for Ring {
     fn default() -> Self {
-        Ring { room: vec![Edge::NOWHERE; ROOM], edges: 0, closed: false, squares: 0.0 }
+        Ring { room: vec![Edge::NOWHERE; ROOM], edges: 0, closed: false, squares: 0.0, most: usize::MAX }
     }
 }
 
@@ -195,7 +197,23 @@ fn seen_from(origin: &[f64; 3], p: [f64; 3]) -> [f32; 3] {
     [(p[0] - origin[0]) as f32, (p[1] - origin[1]) as f32, (p[2] - origin[2]) as f32]
 }
 
+/// Adds to a list of those of `most` that have changed; what is in it again goes before it doubles that.
+#[inline]
+fn note(changed: &mut Vec<u32>, which: u32, most: usize) {
+    if changed.len() >= 2 * most + 64 {
+        changed.sort_unstable();
+        changed.dedup();
+    }
+    changed.push(which);
+}
+
 impl Walk {
+    /// Bytes of a walk that has so many vertices and faces, and of lists of those of the base that have changed.
+    pub(super) fn bytes(vertices: u128, faces: u128, double: bool) -> u128 {
+        let exact = if double { size_of::<[f64; 3]>() } else { 0 };
+        (size_of::<Vertex>() + exact) as u128 * vertices + size_of::<Face>() as u128 * faces
+    }
+
     /// At the base. `None` if its faces refer to what does not exist.
     pub(super) fn new(pm: &ProgressiveMesh) -> Option<Self> {
         let n0 = pm.base_vertices();
@@ -291,22 +309,25 @@ impl Walk {
 
     /// Room for so many more splits.
     pub(super) fn reserve(&mut self, splits: usize) {
-        self.vertices.reserve(splits);
-        self.faces.reserve(2 * splits);
+        self.vertices.reserve_exact(splits);
+        self.faces.reserve_exact(2 * splits);
+        if let Some(exact) = &mut self.exact {
+            exact.reserve_exact(splits);
+        }
     }
 
     /// Notes that vertex `v` is about to change.
     #[inline]
     pub(super) fn changes(&mut self, v: u32) {
         if (v as usize) < self.base.1 {
-            self.changed.1.push(v);
+            note(&mut self.changed.1, v, self.base.1);
         }
     }
 
     #[inline]
     fn face_mut(&mut self, f: u32) -> &mut Face {
         if (f as usize) < self.base.0 {
-            self.changed.0.push(f);
+            note(&mut self.changed.0, f, self.base.0);
         }
         &mut self.faces[f as usize]
     }
@@ -357,7 +378,7 @@ impl Walk {
             squares += edge.to[3];
             match ring.room.get_mut(n) {
                 Some(room) => *room = edge,
-                None if n > self.faces.len() => return None,
+                None if n > self.faces.len().min(ring.most) => return None,
                 None => ring.room.resize(2 * n, edge),
             }
             n += 1;
@@ -392,7 +413,7 @@ impl Walk {
             if exit == NONE {
                 break;
             }
-            if room.len() > 2 * self.faces.len() + 1 {
+            if room.len() > (2 * self.faces.len() + 1).min(ring.most) {
                 return None;
             }
             before = turn(exit);

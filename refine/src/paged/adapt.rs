@@ -5,9 +5,9 @@ use super::shelf::Fetch;
 use super::timed::CHANGE;
 use super::{PagedError, PagedView};
 use crate::aif::NONE;
-use crate::format::ByteRanges;
+use crate::format::{ByteRanges, CONTRADICTS, FormatError};
 use crate::progressive::Damage;
-use crate::selective::{Done, Judges, Lens, Limits, Meter};
+use crate::selective::{Done, Due, Judges, Lens, Limits, Meter};
 use std::cmp::Reverse;
 
 /// How far a frame may go.
@@ -162,7 +162,6 @@ impl<S: ByteRanges> PagedView<S> {
                 break;
             }
             at -= 1;
-            let now = self.clock.now();
             let Some(&o) = self.open.get(at) else { break };
             frame.meter.looks += 1;
             let (wanted, due) = self.clock.of_next(judges, &o.entry);
@@ -171,7 +170,7 @@ impl<S: ByteRanges> PagedView<S> {
                 continue;
             }
             // Until it is applied.
-            self.open.set_due(at, now);
+            self.open.set_due(at, Due::NOW);
             let (split, rank) = (o.entry.split, judges.rank(&o.entry));
             self.enqueue(rank, split, frame);
         }
@@ -277,7 +276,18 @@ impl<S: ByteRanges> PagedView<S> {
                 if !self.make_room(most) {
                     return Ok(Gathered::NoRoom);
                 }
-                self.shelf.fetch(j)?;
+                // Few chunks take more on the way than is set aside; and damage may look so.
+                let told = |e: &PagedError| matches!(e, PagedError::Format(FormatError::Chunk { what, .. }) if *what == CONTRADICTS);
+                if let Err(e) = self.shelf.fetch(j, false) {
+                    if !told(&e) {
+                        return Err(e);
+                    }
+                    let beyond = self.shelf.most_beyond(j)?;
+                    if !self.make_room(most.saturating_add(beyond)) {
+                        return Ok(Gathered::NoRoom);
+                    }
+                    self.shelf.fetch(j, true)?;
+                }
                 frame.all.fetched += 1;
             }
             self.shelf.mark(j, true);

@@ -4,7 +4,8 @@ use super::PagedError;
 use super::page::{APPLIED, Base, LED, MARKED, Page, RowRef};
 use crate::aif::NONE;
 use crate::format::{
-    ByteRanges, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, pages, read_piece,
+    ByteRanges, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, Room, pages, read_piece,
+    read_piece_within,
 };
 use crate::hierarchy::Packed;
 use crate::progressive::{Damage, Fans, link_faces};
@@ -65,10 +66,16 @@ pub(super) struct Shelf<S> {
     pub(super) traffic: Traffic,
 }
 
-/// Bytes that decoding a split takes on the way, at most: rings, edges and models of the decoder ([`crate::format`]), arrays that double.
-const DECODING: usize = 1024;
 /// Splits between two entries of the index.
 const STRIDE: usize = 1024;
+
+/// Bytes that decoding a chunk of splits with its `BNDS` and its `PAGE`, the last, takes at most on the way, besides the page that comes of it: what is fetched, and what the decoders hold.
+fn on_the_way(head: &MeshHead, [c, page]: [&Chunk; 2], room: Room) -> usize {
+    let fetched = page.range().end.saturating_sub(c.offset);
+    // One after the other, but what was read first is there.
+    let all = fetched.saturating_add(room.bytes(head, c)).saturating_add(pages::scratch(c.count, page.raw));
+    usize::try_from(all).unwrap_or(usize::MAX / 4)
+}
 
 /// What it takes to get a page.
 pub(super) enum Fetch {
@@ -141,7 +148,7 @@ impl<S: ByteRanges> Shelf<S> {
             };
             let faces = head.first_face(c.first + c.count) - head.first_face(c.first);
             moves |= c.raw != c.count as u64 * (18 + point);
-            scratch = scratch.max((p.range().end - c.offset) as usize + DECODING * c.count as usize);
+            scratch = scratch.max(on_the_way(&head, [&c, &p], Room::usual(c.count)));
             while index.len() * STRIDE < (c.first + c.count) as usize {
                 index.push(k as u32);
             }
@@ -192,6 +199,7 @@ impl<S: ByteRanges> Shelf<S> {
         let directory = self.reader.directory();
         let head = 4 * (self.head.single.capacity() + self.head.levels.capacity());
         self.base.bytes()
+            + usize::try_from(Room::base_bytes(&self.head)).unwrap_or(usize::MAX / 4)
             + head
             + size_of::<ChunkAt>() * self.chunks.capacity()
             + 4 * self.index.capacity()
@@ -204,7 +212,7 @@ impl<S: ByteRanges> Shelf<S> {
         self.reader.directory().bytes()
     }
 
-    /// What decoding a chunk takes on the way, at most.
+    /// What is set aside for decoding a chunk: what it takes on the way, at most.
     pub(super) fn most_at_once(&self) -> usize {
         self.scratch
     }
@@ -295,14 +303,28 @@ impl<S: ByteRanges> Shelf<S> {
         }
     }
 
-    /// Fetches and decodes the page of split `i`.
-    pub(super) fn fetch(&mut self, i: u32) -> Result<(), PagedError> {
+    /// What the directory says of the chunk of split `i`, and of the two behind it.
+    fn entries(&self, i: u32) -> Result<[Chunk; 3], PagedError> {
+        let place = self.chunks.get(self.chunk_of(i)).map_or(0, |c| c.index as usize);
+        match self.reader.directory().chunks.get(place..place + 3) {
+            Some(&[chunk, bounds, beside]) => Ok([chunk, bounds, beside]),
+            _ => Err(FormatError::Head("no such chunk").into()),
+        }
+    }
+
+    /// What decoding the chunk of split `i` takes on the way beyond [`Shelf::most_at_once`], if it takes all that the format allows.
+    pub(super) fn most_beyond(&self, i: u32) -> Result<usize, PagedError> {
+        let [chunk, _, beside] = self.entries(i)?;
+        Ok(on_the_way(&self.head, [&chunk, &beside], Room::ANY).saturating_sub(self.scratch))
+    }
+
+    /// Fetches and decodes the page of split `i`, taking on the way as much as [`Shelf::most_at_once`] says; `all`: whatever it takes ([`Shelf::most_beyond`]).
+    ///
+    /// Errors: damage, which too little room cannot be told from; the source's.
+    pub(super) fn fetch(&mut self, i: u32, all: bool) -> Result<(), PagedError> {
         let at = self.chunk_of(i);
-        let directory = self.reader.directory();
-        let place = self.chunks.get(at).map_or(0, |c| c.index as usize);
-        let Some(&[chunk, bounds, beside]) = directory.chunks.get(place..place + 3) else {
-            return Err(FormatError::Head("no such chunk").into());
-        };
+        let [chunk, bounds, beside] = self.entries(i)?;
+        let room = if all { Room::ANY } else { Room::usual(chunk.count) };
         // One range: they stand side by side.
         let bytes =
             self.reader.source().fetch(chunk.offset..beside.range().end).map_err(FormatError::from)?;
@@ -312,7 +334,12 @@ impl<S: ByteRanges> Shelf<S> {
             let end = (c.range().end - chunk.offset).min(bytes.len() as u64) as usize;
             &bytes[((c.offset - chunk.offset) as usize).min(end)..end]
         };
-        let block = match read_piece(&chunk, Some(&self.head), part(&chunk))? {
+        let block = read_piece_within(&chunk, Some(&self.head), part(&chunk), room);
+        if all {
+            // What has grown beyond what is set aside is not kept.
+            self.head.start.forget();
+        }
+        let block = match block? {
             Piece::Splits(block) => block,
             _ => return Err(chunk.damage("it is no chunk of splits").into()),
         };

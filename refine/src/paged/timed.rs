@@ -20,7 +20,7 @@ impl<S: ByteRanges> PagedView<S> {
     /// there at once.
     ///
     /// Then [`PagedView::adapt`] only finds what is asked for; [`PagedView::follow`], called after it, changes what is drawn. What is undone stays until its vertices have moved, and
-    /// so does its memory; each vertex on the way takes 176 B more. Where there is no room for that within the limit, the changes of a frame are made at once; so no mesh is coarser for it.
+    /// so does its memory; each vertex on the way takes 176 B more. Where there is no room for that within the limit, the changes of a frame are made at once before anything is left coarser.
     ///
     /// Errors: as [`PagedView::follow`].
     pub fn set_timed(&mut self, frames: Option<u32>) -> Result<(), PagedError> {

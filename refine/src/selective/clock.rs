@@ -206,7 +206,10 @@ impl Clock {
     /// When a decision that has this slack now is due; what is so late that time does not reach so far comes at times that differ by `salt`, or all would come at once.
     #[inline]
     pub(crate) fn due(&self, slack: f64, salt: u32) -> u16 {
-        time(self.now, &self.pace, slack, salt)
+        let most = AHEAD - (salt.wrapping_mul(0x9e37_79b1) >> 18) as u16;
+        let steps = slack * SAFE / self.pace.diagonal * STEPS;
+        // NaN is 0.
+        self.now.wrapping_add(if steps >= most as f64 { most } else { steps as u16 })
     }
 
     /// What never is, unless it is made so: it still must be looked at now and then, before the time comes round.
@@ -219,15 +222,6 @@ impl Clock {
     pub(crate) fn has_come(now: u16, due: u16) -> bool {
         due.wrapping_sub(now) as i16 <= 0
     }
-}
-
-/// As [`Clock::due`].
-#[inline]
-fn time(now: u16, pace: &Pace, slack: f64, salt: u32) -> u16 {
-    let most = AHEAD - (salt.wrapping_mul(0x9e37_79b1) >> 18) as u16;
-    let steps = slack * SAFE / pace.diagonal * STEPS;
-    // NaN is 0.
-    now.wrapping_add(if steps >= most as f64 { most } else { steps as u16 })
 }
 
 impl Lens {

@@ -56,6 +56,13 @@ impl Start {
         Some(walk.unwrap_or_else(|| base.clone()))
     }
 
+    /// Lets go of what is kept for the next.
+    pub(crate) fn forget(&self) {
+        if let Some((_, free)) = self.0.as_deref() {
+            free.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        }
+    }
+
     /// For the next that takes one: clearing what was done takes less time than a new one.
     pub(in super::super) fn give(&self, state: Sequel) {
         if let Some((base, free)) = self.0.as_deref() {

@@ -1,94 +1,97 @@
-//! Clocks for what is near the eye.
+//! Times for decisions that are looked at one by one: by how far the lens has moved and how far it has turned, apart.
 //!
-//! How far a lens moves is measured at the farthest place that a decision may be about: there turning counts most. Of what is near turning moves little, and a flight close to the ground turns and is near all of the
-//! time. So besides the clock for all there are some that measure at shorter distances, each a quarter of the one before: places that are within three quarters of one's reach have their time by it, and as no time
-//! is farther ahead than a quarter of the reach, the eye comes no farther away from them than the reach, while they wait. What slack is, and why it is enough, is what it is for all (see [`super`]).
+//! A [`Clock`] takes both together at the farthest place that a decision may be about: there turning counts most. Of what is near turning moves little, and a flight close to the ground turns all of the time
+//! and is near to most that it shows. So here a decision about a sphere whose middle is `away` from the eye keeps its distance, too.
+//!
+//! **Why it stands.** Let M be the sum of how far the eye has moved from frame to frame, and T that of how far the axes of the view have turned (the length of the largest difference of unit normals of the
+//! picture's planes). From one frame to the next a depth, or a distance from a plane, of a place p changes by at most dM + dT |p - eye|; a distance from the eye, or what tells how far a cone is turned, by at most dM. With slack
+//! s <= away and a = away + s: as long as the sum M + a T has grown by less than s, the eye has moved by less than s, so it is nearer to p than a, and no function has changed by s. A change of the tolerance adds to M what it adds to the
+//! distance of a clock. Sums are kept in f64, times in f32 with a margin for its rounding, and all begins anew when the sums become large.
 
-use super::{AHEAD, About, Clock, Judges, Pace, STEPS};
+use super::{AHEAD, About, Clock, Judges, Pace, SAFE, STEPS};
+use crate::selective::Lens;
 use crate::selective::entry::Entry;
 
-/// Short reaches.
-const SHORT: usize = 5;
-/// How much shorter each is than the one before; the first is the diagonal.
-const STEP: f64 = 0.25;
-
-/// What the eye's way counts by here: these clocks take all of it, as depths and planes are measured from the eye.
-const EYE: f64 = 1.0;
-
-/// A clock for all, and some for what is near; for decisions that are looked at one by one.
+/// Sums of what lenses have moved and turned.
 #[derive(Clone, Debug)]
 pub(crate) struct Clocks {
+    /// For other lenses than one in perspective, and for what changes at once.
     all: Clock,
-    near: [Near; SHORT],
-    /// What is near has its time by clocks of its own: of one lens, in perspective.
+    moved: f64,
+    turned: f64,
+    /// There is one lens, in perspective.
     apart: bool,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Near {
-    pace: Pace,
-    now: u16,
-    /// Since the last frame the lens has moved farther than any time reaches: all is due.
-    stale: bool,
+/// When to look at something again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Due {
+    /// How much turning counts.
+    away: f32,
+    until: f32,
 }
 
-/// When to look at something again, by which clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Due {
-    at: u16,
-    /// 0 for that for all.
-    by: u8,
+/// Of sums of f32: a few roundings, of 6e-8 each.
+const ROUNDED: f64 = 1e-6;
+/// The largest sums: radians, and diagonals.
+const MOST: f64 = 4.0;
+
+impl Due {
+    /// Always.
+    pub(crate) const NOW: Due = Due { away: 0.0, until: f32::NEG_INFINITY };
 }
 
 impl Clocks {
     /// Before the first lens.
     pub(crate) fn new(diagonal: f64) -> Clocks {
-        let all = Clock::new(diagonal);
-        let near = std::array::from_fn(|k| {
-            let pace =
-                Pace { about: About::Eye, diagonal: diagonal * STEP.powi(k as i32), eye: EYE, ..all.pace };
-            Near { pace, now: 0, stale: true }
-        });
-        Clocks { all, near, apart: false }
+        Clocks { all: Clock::new(diagonal), moved: 0.0, turned: 0.0, apart: false }
     }
 
     /// As [`Clock::go_on`].
     pub(crate) fn go_on(&mut self, judges: &Judges<'_>) -> bool {
-        let one = |l: &[super::Lens]| matches!(l, [l] if l.perspective);
-        self.apart = one(&self.all.lenses) && one(judges.lenses);
-        for n in &mut self.near {
-            n.pace.per_tau = self.all.pace.per_tau;
-            n.stale = true;
-            if let ([a], [b]) = (&self.all.lenses[..], judges.lenses) {
-                let kept = ((a, self.all.keep * a.tau), (b, judges.keep * b.tau));
-                let motion = n.pace.motion((a, a.tau), (b, b.tau));
-                let most = motion.zip(n.pace.motion(kept.0, kept.1)).map_or(f64::INFINITY, |(a, b)| a.max(b));
-                let steps = (most / n.pace.diagonal * STEPS).ceil();
-                // Not the comparison turned round: NaN is no time.
-                if steps < AHEAD as f64 {
-                    (n.now, n.stale) = (n.now.wrapping_add(steps as u16), false);
-                }
+        let apart = matches!(judges.lenses, [l] if l.perspective);
+        let motion = self.motion(judges, apart);
+        let stands = self.all.go_on(judges);
+        if let Some([moved, turned]) = motion.filter(|_| stands && self.apart == apart) {
+            self.moved += moved;
+            self.turned += turned;
+            if self.moved < MOST * self.all.pace.diagonal && self.turned < MOST {
+                return true;
             }
         }
-        let stands = self.all.go_on(judges);
-        self.apart |= !stands && one(judges.lenses);
-        self.near.iter_mut().for_each(|n| n.pace.per_tau = self.all.pace.per_tau);
-        stands
+        (self.moved, self.turned, self.apart) = (0.0, 0.0, apart);
+        false
     }
 
-    /// Now.
-    #[inline]
-    pub(crate) fn now(&self) -> Due {
-        Due { at: self.all.now, by: 0 }
-    }
-
-    /// It is time for what is due then.
-    #[inline]
-    pub(crate) fn has_come(&self, due: Due) -> bool {
-        match self.near.get((due.by as usize).wrapping_sub(1)) {
-            None => Clock::has_come(self.all.now, due.at),
-            Some(n) => n.stale || Clock::has_come(n.now, due.at),
+    /// How far the lenses move, and how far they turn, from those of the last frame; `None` if nothing stands.
+    fn motion(&self, judges: &Judges<'_>, apart: bool) -> Option<[f64; 2]> {
+        if self.all.lenses.len() != judges.lenses.len() {
+            return None;
         }
+        let (mut moved, mut turned) = (0.0f64, 0.0f64);
+        for (a, b) in self.all.lenses.iter().zip(judges.lenses) {
+            let kept = ((a, self.all.keep * a.tau), (b, judges.keep * b.tau));
+            if apart {
+                let [step, turn] = steps(a, b)?;
+                let by_tau = |(a, at): (&Lens, f64), (b, bt): (&Lens, f64)| {
+                    let (was, is) = (a.scale(at) / at, b.scale(bt) / bt);
+                    if was == is { 0.0 } else { (is / was).ln().abs() * self.all.pace.per_tau }
+                };
+                let by_tau = by_tau((a, a.tau), (b, b.tau)).max(by_tau(kept.0, kept.1));
+                // What is too large, or none, is noticed by the clock for all.
+                (moved, turned) = (moved.max(step + by_tau), turned.max(turn));
+            } else {
+                let pace = &self.all.pace;
+                moved = moved.max(pace.motion((a, a.tau), (b, b.tau))?).max(pace.motion(kept.0, kept.1)?);
+            }
+        }
+        Some([moved, turned])
+    }
+
+    /// The sums now.
+    #[inline]
+    pub(crate) fn sums(&self) -> Sums {
+        Sums { moved: self.moved as f32, turned: self.turned as f32 }
     }
 
     /// Whether a split is needed, and when that is to be looked at again.
@@ -103,28 +106,71 @@ impl Clocks {
         self.of(judges, e, judges.keep)
     }
 
+    #[inline]
     fn of(&self, judges: &Judges<'_>, e: &Entry, part: f64) -> (bool, Due) {
-        let by = match judges.lenses {
+        // As far as changes of the tolerance are looked after.
+        let most = AHEAD as f64 / STEPS * self.all.pace.diagonal;
+        let (v, away, slack) = match judges.lenses {
             [lens] if self.apart => {
                 let away = (e.centre.as_dvec3() - lens.eye).length();
-                self.near.iter().rposition(|n| away <= 0.75 * n.pace.diagonal)
+                // Places as they come, however far: they say themselves.
+                let pace = Pace {
+                    about: About::Eye,
+                    diagonal: f64::INFINITY,
+                    per_tau: self.all.pace.per_tau,
+                    eye: 1.0,
+                };
+                let v = lens.verdict(e, part * lens.tau, &pace);
+                let slack = v.slack.min(away).min(most);
+                (v, away + slack, slack)
             }
-            _ => None,
+            _ => {
+                let v = judges.of(e, part, &self.all.pace);
+                (v, 0.0, v.slack.min(most))
+            }
         };
-        let Some(mut k) = by else {
-            let v = judges.of(e, part, &self.all.pace);
-            return (v.wanted, Due { at: self.all.due(v.slack, e.split), by: 0 });
-        };
-        let v = judges.of(e, part, &self.near[k].pace);
-        // By a slower one if its time is far ahead: the slack is as good for it, as it is near for that, too.
-        let reach = AHEAD as f64 / STEPS;
-        while k > 0 && v.slack > reach * self.near[k].pace.diagonal {
-            k -= 1;
-        }
-        let n = &self.near[k];
-        let clock = super::time(n.now, &n.pace, v.slack, e.split);
-        (v.wanted, Due { at: clock, by: k as u8 + 1 })
+        let until = self.moved + away * self.turned + slack * SAFE;
+        let until = (until - ROUNDED * until) as f32;
+        // NaN is now.
+        (v.wanted, if until.is_nan() { Due::NOW } else { Due { away: away as f32, until } })
     }
+}
+
+/// The sums at a frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Sums {
+    moved: f32,
+    turned: f32,
+}
+
+impl Sums {
+    #[inline(always)]
+    pub(crate) fn have_reached(self, due: Due) -> bool {
+        self.moved + due.away * self.turned >= due.until
+    }
+}
+
+/// How far the eye moves from one lens in perspective to another, and how far the axes turn; `None` if they are not of one kind.
+fn steps(a: &Lens, b: &Lens) -> Option<[f64; 2]> {
+    let same = a.frustum.is_some() == b.frustum.is_some()
+        && (a.back, a.perspective, a.near, a.slant) == (b.back, b.perspective, b.near, b.slant)
+        && a.directional == b.directional
+        && (a.steep - b.steep).abs() <= 1e-12 * a.steep;
+    if !same || !a.perspective {
+        return None;
+    }
+    let mut moved = (b.eye - a.eye).length();
+    // Depth is measured along a gradient of the length `steep`, and its slack divided by that.
+    let mut turned = (b.gradient / b.steep - a.gradient / a.steep).length();
+    if let (Some(f), Some(g)) = (&a.frustum, &b.frustum) {
+        let origin = (g.origin() - f.origin()).length();
+        for (p, q) in f.planes().iter().zip(g.planes()) {
+            let off = if p.offset == q.offset { 0.0 } else { (q.offset - p.offset).abs() };
+            moved = moved.max(origin + off);
+            turned = turned.max((q.normal - p.normal).length());
+        }
+    }
+    Some([moved, turned])
 }
 
 #[cfg(test)]
@@ -186,7 +232,7 @@ mod tests {
                 assert_eq!(stands, one_stands);
                 let begun = frame > 0;
                 for (i, e) in entries.iter().enumerate() {
-                    if begun && stands && !clocks.has_come(dues[i].1) {
+                    if begun && stands && !clocks.sums().have_reached(dues[i].1) {
                         assert_eq!(dues[i].0, judges.keep(e), "round {round}, frame {frame}, {e:?}");
                         stood += 1;
                     } else {
