@@ -215,7 +215,7 @@ fn what_cannot_be_is_refused() {
     p.run("encode in.obj out.pm --epsilon 3").failed(2, "--epsilon is for --method nsa");
     p.run("encode in.obj none/out.pm").failed(4, "there is no directory");
     p.run("encode none.obj out.pm").failed(3, "none.obj");
-    p.run("decode in.obj out.ply").failed(3, "no progressive mesh");
+    p.run("decode in.obj out.ply").failed(3, "`progmesh encode` makes one of a mesh");
     p.run("encode in.obj - --json").failed(2, "both want standard output");
 }
 

@@ -118,6 +118,9 @@ pub(crate) fn read_progressive(
             DecodeError::Progressive(FormatError::Chunk { .. }) if !salvage => {
                 "; --salvage of `decode` uses all that is whole"
             }
+            DecodeError::Progressive(FormatError::NotAProgressiveMesh) => {
+                "; `progmesh encode` makes one of a mesh, `progmesh convert` writes a mesh in another format"
+            }
             _ => "",
         };
         Failure::Input(format!("{file}: {e}{advice}"))
