@@ -153,7 +153,7 @@ fn a_limit_is_kept_and_changes_no_mesh() {
     };
     assert_eq!(whole(high), Some(true));
     let mut short = 0;
-    for _ in 0..10 {
+    for _ in 0..14 {
         let middle = (low + high) / 2;
         match whole(middle) {
             Some(true) => high = middle,
@@ -164,7 +164,7 @@ fn a_limit_is_kept_and_changes_no_mesh() {
         }
     }
     assert!(short > 0, "some limits are too small for the view, but not for the base");
-    let tight = fly(&bytes, high + (16 << 10), 6);
+    let tight = fly(&bytes, high, 6);
     assert!(tight.traffic().evictions > 0, "{:?}", tight.traffic());
     assert_eq!(tight.traffic().bytes_touched, all.bytes_touched);
 }

@@ -42,7 +42,8 @@ fn valence_class(n: usize) -> usize {
 #[derive(Clone, Debug, Default)]
 struct Models {
     roots: Number,
-    root: Number,
+    first: Number,
+    gap: [Number; 2],
     split: sweep::Split,
     done: [[Bit; 8]; 3],
     code_same: Bit,
@@ -84,6 +85,8 @@ struct Codec<'a> {
     /// The vertices to be visited in this sweep, and the place of the next; those of the next sweep.
     pass: Vec<u32>,
     at: usize,
+    /// Of no meaning: what was looked at ahead.
+    ahead: u8,
     list: Vec<u32>,
     /// Something was split in this sweep.
     moved: bool,
@@ -116,6 +119,7 @@ impl<'a> Codec<'a> {
             ring: Ring::default(),
             pass: Vec::new(),
             at: 0,
+            ahead: 0,
             list: Vec::new(),
             moved: true,
             to_come: Vec::new(),
@@ -280,8 +284,8 @@ impl Room {
         let edges = (2 * faces + 2).min(self.ring as u128 + 64);
         let ring = 2 * GROWN * size_of::<super::walk::Edge>() as u128 * edges;
         let known = GROWN * 12 * context;
-        // Two sweeps, and roots with their labels: of the context's splits or the chunk's.
-        let sweeps = GROWN * (2 * 2 * 4 + 16) * context.max(count);
+        // Two sweeps: of the context's splits or the chunk's.
+        let sweeps = GROWN * 2 * 2 * 4 * context.max(count);
         // Of arrays that no room is made for at once; rows are kept by vertex.
         let plain = count * (18 + if head.double { 24 } else { 12 });
         let grows = if raw == plain { 0 } else { GROWN * raw };

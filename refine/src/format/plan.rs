@@ -158,7 +158,7 @@ impl Plan {
             chunk: vec![u32::MAX; n],
             slot: (0..n0 as u32).chain(std::iter::repeat_n(NONE, n)).collect(),
             order: Vec::with_capacity(n),
-            labels: labels(&base),
+            rank: &rank,
         };
         let mut plan = Plan::default();
         for band in keys.chunk_by(|&a, &b| bands[a as usize] == bands[b as usize]) {
@@ -357,8 +357,8 @@ struct Schedule<'a> {
     /// Number in the file of a vertex, once it has one.
     slot: Vec<u32>,
     order: Vec<u32>,
-    /// By number in the file: of the vertices so far.
-    labels: Vec<Label>,
+    /// The place of each vertex in the order of descent.
+    rank: &'a [u32],
 }
 
 impl Schedule<'_> {
@@ -389,17 +389,16 @@ impl Schedule<'_> {
     /// Appends the splits of chunk `number`.
     fn add(&mut self, taken: &[u32], number: u32) {
         let n0 = self.pm.base_vertices();
-        let mut roots: Vec<(u64, u32, u32)> = Vec::new();
+        let mut roots: Vec<(u32, u32)> = Vec::new();
         for &i in taken {
             let before = self.forest.on[i as usize][0];
             if before == NONE || self.chunk[before as usize] != number {
-                let v = self.slot[self.pm.splits.vertex[i as usize] as usize];
-                roots.push((self.labels[v as usize].key(), v, i));
+                roots.push((self.rank[self.pm.splits.vertex[i as usize] as usize], i));
             }
         }
         roots.sort_unstable();
         // A list of the vertices by the split that is to come at each.
-        let mut list: Vec<u32> = roots.into_iter().map(|r| r.2).collect();
+        let mut list: Vec<u32> = roots.into_iter().map(|r| r.1).collect();
         let mut pass = Vec::with_capacity(list.len());
         while !list.is_empty() {
             std::mem::swap(&mut list, &mut pass);
@@ -416,9 +415,6 @@ impl Schedule<'_> {
                 }
                 self.slot[n0 + i as usize] = (n0 + self.order.len()) as u32;
                 self.order.push(i);
-                let v = self.slot[self.pm.splits.vertex[i as usize] as usize];
-                let new = self.labels[v as usize].split();
-                self.labels.push(new);
                 let here = |s: &u32| *s != NONE && self.chunk[*s as usize] == number;
                 list.extend(Some(self.forest.again[i as usize]).filter(here));
                 list.extend(Some(self.forest.first[i as usize]).filter(here));

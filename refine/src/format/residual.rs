@@ -56,11 +56,9 @@ impl Guess {
 
     /// The last coordinate on the plane through `at`, given the others.
     #[inline(always)]
-    pub(super) fn on_plane(&self, out: &[f64; 3]) -> f64 {
+    pub(super) fn on_plane(&self, x: f64, y: f64) -> f64 {
         let [a, b, last] = self.axes;
-        self.at[last]
-            - self.slope[a] as f64 * (out[a] - self.at[a])
-            - self.slope[b] as f64 * (out[b] - self.at[b])
+        self.at[last] - self.slope[a] as f64 * (x - self.at[a]) - self.slope[b] as f64 * (y - self.at[b])
     }
 }
 
@@ -257,20 +255,23 @@ impl<const KINDS: usize> Residuals<KINDS> {
             let h = halves(guess.reach[axis]).max(longest - 7);
             (h, (((longest - h) >> 1) as usize).min(FLAT - 1))
         };
-        let mut out = [0.0; 3];
         let (h, flat) = near(a);
-        out[a] = self.one(c, scale, (set, flat), (a, guess.at[a], h), value[a]);
+        let x = self.one(c, scale, (set, flat), (a, guess.at[a], h), value[a]);
         let (h, flat) = near(b);
-        out[b] = self.one(c, scale, (set, FLAT + flat), (b, guess.at[b], h), value[b]);
+        let y = self.one(c, scale, (set, FLAT + flat), (b, guess.at[b], h), value[b]);
         // On the plane through both.
-        let expected = guess.on_plane(&out);
+        let expected = guess.on_plane(x, y);
         let rise = halves(guess.rise).clamp(longest - 24, longest + 2);
         let steep = guess.slope[a] * guess.slope[a] + guess.slope[b] * guess.slope[b] >= 1.0;
         let error = if level > 0 { level as i32 - 254 + steep as i32 } else { rise - 4 };
         let error = error.clamp(longest - 24, longest + 2);
         let context = 2 * FLAT + (((rise - error).clamp(-4, 11) + 4) >> 1) as usize;
-        out[last] = self.one(c, scale, (set, context), (last, expected, error), value[last]);
-        out
+        let z = self.one(c, scale, (set, context), (last, expected, error), value[last]);
+        match last {
+            0 => [z, x, y],
+            1 => [x, z, y],
+            _ => [x, y, z],
+        }
     }
 
     /// One coordinate.

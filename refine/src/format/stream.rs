@@ -145,6 +145,8 @@ impl Next {
 #[derive(Clone, Copy, Debug)]
 struct Vertex {
     label: Label,
+    /// The next in the order of descent.
+    behind: u32,
     /// The last split of it, or that which made it.
     last: u32,
     /// The node it is at, by numbers in the file.
@@ -167,6 +169,8 @@ pub struct Path<'a> {
     /// Which corner of each face that splits make was the tip; they are turned so that it is the first.
     tips: Vec<u8>,
     vertices: Vec<Vertex>,
+    /// The first in the order of descent.
+    first: u32,
     /// The first split of every chunk.
     chunks: Vec<u32>,
     /// For every part its first split, here and in the file.
@@ -177,8 +181,10 @@ pub struct Path<'a> {
 impl<'a> Path<'a> {
     /// At the base.
     pub fn new(tree: &'a Tree) -> Path<'a> {
-        let labels = plan::labels(&plan::base_order(&tree.base));
-        let vertex = |(label, node): (Label, u32)| Vertex { label, last: NONE, node, next: Next::NOTHING };
+        let order = plan::base_order(&tree.base);
+        let vertex = |(label, node)| Vertex { label, behind: NONE, last: NONE, node, next: Next::NOTHING };
+        let mut vertices: Vec<Vertex> = plan::labels(&order).into_iter().zip(0..).map(vertex).collect();
+        order.windows(2).for_each(|w| vertices[w[0] as usize].behind = w[1]);
         let head = MeshHead { splits: 0, ..tree.head.clone() };
         Path {
             tree,
@@ -187,7 +193,8 @@ impl<'a> Path<'a> {
             on: vec![],
             places: vec![],
             tips: vec![],
-            vertices: labels.into_iter().zip(0..).map(vertex).collect(),
+            vertices,
+            first: order.first().copied().unwrap_or(NONE),
             chunks: vec![],
             names: vec![],
             parts: vec![],

@@ -351,7 +351,7 @@ impl Codec<'_> {
         let flat = longest - octave(guess.rise);
         let off = guess.off(std::array::from_fn(|k| (place[k] - guess.at[k]) as f32)) as f64;
         let steps = self.steps(c, (1, flat), off * power(ALONG - longest)) * power(longest - ALONG);
-        out[last] = guess.on_plane(&out) + steps;
+        out[last] = guess.on_plane(out[a], out[b]) + steps;
         out
     }
 

@@ -3,6 +3,7 @@
 use super::super::coder::{Bit, Coder};
 use super::super::walk::TOUCHED;
 use super::{Codec, VALENCES, valence_class};
+use crate::aif::NONE;
 
 /// What a vertex did when the sweep last came by.
 const ROOT: u8 = 0;
@@ -12,6 +13,9 @@ const SPLIT: u8 = 2;
 const WAITED: u8 = 3;
 const MOST: u8 = 6;
 const DONE: u8 = 7;
+
+/// So far ahead of the sweep vertices are looked at.
+const AHEAD: usize = 4;
 
 /// Levels above the least of the chunk that are told apart, and one more for splits that only prepare.
 const LEVELS: usize = 7;
@@ -42,41 +46,53 @@ impl Codec<'_> {
     }
 
     /// Codes the roots of `count` splits that follow; a writer gives their vertices.
+    ///
+    /// Roots come in the order of descent, each by how many vertices it leaves out: neighbours mostly are roots together.
     pub(super) fn begin<C: Coder>(&mut self, c: &mut C, of: &[u32], count: usize) -> Option<()> {
         let first = self.walk.vertices.len() as u32;
-        let mut older: Vec<u32> = of.iter().copied().filter(|&v| v < first).collect();
+        let mut roots = 0;
         if !C::READS {
             self.to_come.resize(self.to_come.len().max(first as usize + of.len()), 0);
             for &v in of {
-                *self.to_come.get_mut(v as usize)? += 1;
+                let times = self.to_come.get_mut(v as usize)?;
+                roots += (*times == 0 && v < first) as u64;
+                *times += 1;
             }
         }
-        older.sort_unstable();
-        older.dedup();
-        let mut roots: Vec<(u64, u32)> = Vec::with_capacity(older.len());
-        let number = c.number(&mut self.m.roots, older.len() as u64);
-        if number > count as u64 {
+        let roots = c.number(&mut self.m.roots, roots);
+        if roots > count as u64 {
             return None;
         }
         self.pass.clear();
         self.at = 0;
         self.list.clear();
         self.moved = true;
-        let mut next = 0u64;
-        for k in 0..number as usize {
-            let gap = c.number(&mut self.m.root, older.get(k).map_or(0, |&r| r as u64 - next));
-            let v = u32::try_from(next.checked_add(gap)?).ok().filter(|&v| v < first)?;
-            next = v as u64 + 1;
-            self.walk.changes(v);
-            self.walk.vertices[v as usize].visit = ROOT;
-            roots.push((self.walk.label(v).key(), v));
-            if c.spent() {
+        let mut v = self.walk.head;
+        for k in 0..roots {
+            let mut gap = 0;
+            if !C::READS {
+                while *self.to_come.get(v as usize)? == 0 {
+                    v = self.walk.next(v);
+                    gap += 1;
+                }
+            }
+            if k == 0 {
+                // Far from the first of all.
+                v = u32::try_from(c.number(&mut self.m.first, v as u64)).ok().filter(|&v| v < first)?;
+            } else {
+                gap = c.number(&mut self.m.gap[self.preparing as usize], gap);
+                for _ in 0..if C::READS { gap } else { 0 } {
+                    v = Some(v).filter(|&v| v != NONE).map(|v| self.walk.next(v))?;
+                }
+            }
+            if v == NONE || c.spent() {
                 return None;
             }
+            self.walk.changes(v);
+            self.walk.vertices[v as usize].visit = ROOT;
+            self.pass.push(v);
+            v = self.walk.next(v);
         }
-        // In the order of descent.
-        roots.sort_unstable();
-        self.pass.extend(roots.iter().map(|r| r.1));
         Some(())
     }
 
@@ -95,6 +111,10 @@ impl Codec<'_> {
                 continue;
             };
             self.at += 1;
+            // What comes soon is asked for now, so that it is at hand then.
+            if let Some(&soon) = self.pass.get(self.at + AHEAD) {
+                self.ahead ^= self.walk.vertices[soon as usize].valence;
+            }
             let vertex = &mut self.walk.vertices[v as usize];
             let visit = vertex.visit;
             if visit.wrapping_sub(WAITED) < TOUCHED - WAITED {

@@ -148,6 +148,11 @@ impl Path<'_> {
             !can
         });
         roots.sort_unstable();
+        if roots.windows(2).any(|w| w[0].0 == w[1].0) {
+            // Split too often for their labels to tell: vertices in turn.
+            let rank = self.ranks();
+            roots.sort_unstable_by_key(|r| rank[r.1 as usize]);
+        }
         let mut list: Vec<u32> = roots.into_iter().map(|r| r.2).collect();
         let mut pass = Vec::with_capacity(list.len());
         while !list.is_empty() {
@@ -178,16 +183,29 @@ impl Path<'_> {
         candidates
     }
 
+    /// The place of each vertex in the order of descent.
+    pub(super) fn ranks(&self) -> Vec<u32> {
+        let mut ranks = vec![0; self.vertices.len()];
+        let (mut v, mut k) = (self.first, 0);
+        while let Some(vertex) = self.vertices.get(v as usize) {
+            ranks[v as usize] = k;
+            (v, k) = (vertex.behind, k + 1);
+        }
+        ranks
+    }
+
     /// Splits vertex `v`: notes what it was, and appends the new one. The split is numbered on the path and in the file.
     fn grow(&mut self, v: u32, (split, file): (u32, u32), known: u32, open: &mut Open) {
+        let new = self.vertices.len() as u32;
         let at = &mut self.vertices[v as usize];
         if v < known {
             open.undo.push((v, *at));
         }
         open.parent.push(at.node);
         let label = at.label.split();
+        let behind = std::mem::replace(&mut at.behind, new);
         let node = self.head.base_vertices + 2 * file;
         (at.last, at.node) = (split, node);
-        self.vertices.push(Vertex { label, last: split, node: node + 1, next: Next::NOTHING });
+        self.vertices.push(Vertex { label, behind, last: split, node: node + 1, next: Next::NOTHING });
     }
 }
