@@ -5,21 +5,22 @@
 //! For every split there is a bounding sphere, a normal cone and an error, each at least that of all splits below it in the hierarchy: what is
 //! invisible, or fine enough, has nothing below it that is not.
 //!
-//! **What the error bounds, and how far.** The finest mesh is followed at samples: its vertices and quarters of its edges; where a triangle shown stands for many, some are left out. By the
-//! ring rule ([`Rule::Rings`]) what a collapse does to the surface is the same in every mesh of the hierarchy, so the error of a split is, by proof, at least the distance of those samples to any mesh
-//! in which it is undone (`rings.rs`). What lies between samples is covered by [`Options::margin`], which is measured. By the rule of cuts ([`Rule::Cuts`]) rings are not the same, and errors are
-//! the largest that were found in some orders, with a larger margin. Tests, and `progmesh fly --measure-every`, measure what is shown by code of their own. Spheres, cones,
+//! **What the error bounds, and how far.** By the ring rule ([`Rule::Rings`]) what a collapse does to the surface is the same in every mesh of the hierarchy (`rings.rs`), and the finest mesh is followed as a whole, in convex
+//! pieces (`cover.rs`): so the error of a split is, by proof, at least the distance of every point of the finest mesh that it answers for to any mesh in which it is undone. By the rule of cuts ([`Rule::Cuts`]) rings are not the
+//! same: samples are followed, its vertices and quarters of its edges, and errors are the largest that were found in some orders, with a margin ([`Options::margin`]). Tests, and `progmesh fly --measure-every`, measure what is shown by code of their own. Spheres, cones,
 //! and the way they nest are proven.
 
 mod bounds;
 mod cone;
+mod cover;
 mod deviation;
 mod directions;
+mod estimate;
 mod forest;
+mod nearest;
 mod offsets;
 mod rings;
 mod rows;
-mod settled;
 mod spheres;
 mod tree;
 
@@ -54,22 +55,21 @@ pub enum Rule {
 pub struct Options {
     /// When splits may be made.
     pub rule: Rule,
-    /// What errors are multiplied by; at least 1. By the ring rule for what lies between samples.
+    /// What errors are multiplied by; at least 1. By the ring rule they are proven as they are.
     pub margin: f64,
     /// By the ring rule how often the splits are put into the order of the errors that were found. By that of cuts how many walks there are after the one in
     /// the order of the splits, in orders as views bring them about: the first by error, the second and third with parts of the mesh out of view.
     pub rounds: u32,
-    /// Samples of the finest mesh that are followed on each face, on average; where there are more, those of edges are left out, then vertices. At most so many take up time.
+    /// By the rule of cuts: samples of the finest mesh that are followed on each face, on average; where there are more, those of edges are left out, then vertices. At most so many take up time.
     pub samples: usize,
     /// By the ring rule: finds out which way deviations lie, for directional errors ([`crate::selective::Lens::directional`]). 2 B a split.
     pub directions: bool,
 }
 
 impl Options {
-    /// By the ring rule. At a margin of 1 ten views each at tolerances of 0.3, 1 and 4 pixels showed up to 1.19 of it with 100 samples (horse, the textured bunny), up to 1.33 with 60
-    /// (also fandisk, igea and bunny), up to 1.67 with 12 (horse). `docs/selective.md` has what was measured with these values.
+    /// By the ring rule. `docs/selective.md` has what was measured with these values.
     pub const RINGS: Options =
-        Options { rule: Rule::Rings, margin: 1.35, rounds: 1, samples: 100, directions: false };
+        Options { rule: Rule::Rings, margin: 1.0, rounds: 1, samples: 0, directions: false };
     /// By the rule of cuts. At a margin of 1 with two rounds views of five sample meshes (`tests/selective.rs`) showed up to 1.4 of the tolerance, of dragon, igea, horse and the
     /// textured bunny up to 2.0 (their medians about 1.2); without rounds more.
     pub const CUTS: Options =
@@ -177,14 +177,14 @@ impl Settled {
             if turns.is_none() {
                 return Ok(None);
             }
-            let (errors, diagonal) = settled::estimate(&now, &forest, front, options);
+            let (errors, diagonal) = estimate::errors(&now, &forest, front);
             let next = by_errors(&now, errors, diagonal);
             order = next.iter().map(|&i| order[i as usize]).collect();
             now = std::borrow::Cow::Owned(now.reordered(&next).map_err(|e| Damage::Fan(e.0 as usize))?);
         }
         let (forest, front, turns) = finest(&now, Rule::Rings)?;
         let Some(turns) = turns else { return Ok(None) };
-        let mut bounds = settled::measure(&now, &forest, front, options);
+        let mut bounds = cover::measure(&now, &forest, front, options);
         (bounds.guarantee, bounds.turns) = (Guarantee::Settled, turns);
         Ok(Some(Settled { order, mesh: now.into_owned(), forest, bounds }))
     }
@@ -241,7 +241,7 @@ impl Finest {
 
 impl Hierarchy {
     /// Builds the hierarchy: goes through all splits once in each direction. Bounds are those that the mesh carries ([`ProgressiveMesh::bounds`]), and the rule the one they are for;
-    /// if it has none they are measured, which takes about 90 microseconds a vertex.
+    /// if it has none they are measured, which takes about 130 microseconds a vertex.
     ///
     /// By the ring rule the splits come in another order than in `mesh`, and so have other numbers: see [`Hierarchy::mesh`].
     ///

@@ -26,7 +26,7 @@ use std::time::Instant;
 /// Write a mesh as fine as one view needs it: parts that are far, out of sight or turned away are left coarse.
 ///
 /// Of a mesh a progressive mesh is made first; a .pm is refined as it is. Where the camera sees the surface from its front, what is written
-/// deviates from the input by no more than --tau pixels. That is proven at samples of the input, with a margin for what lies between; not by --rule truly.
+/// deviates from the input by no more than --tau pixels. That is proven (docs/selective.md says how); not by --rule cuts or truly.
 #[derive(clap::Args, Debug)]
 #[command(after_help = "\
 Examples:

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum RuleName {
-    /// When all that was split before it around its vertex is: errors are proven at samples
+    /// When all that was split before it around its vertex is: errors are proven
     Rings,
     /// When the faces on its cuts are there (the l/r rule): errors are measured
     Cuts,

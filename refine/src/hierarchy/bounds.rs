@@ -31,7 +31,7 @@ pub enum Guarantee {
     Proven,
     /// Differences of height over a plane, proven by whoever gave them; distances are no larger.
     Vertical,
-    /// Distances of samples, proven for meshes that keep the ring rule ([`super::Rule::Rings`]), with a margin for what lies between them.
+    /// Distances of the whole surface, proven for meshes that keep the ring rule ([`super::Rule::Rings`]).
     Settled,
 }
 

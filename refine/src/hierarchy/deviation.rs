@@ -6,6 +6,7 @@
 
 use super::bounds::Bounds;
 use super::forest::Forest;
+use super::nearest::Reach;
 use super::{Finest, Options, spheres};
 use crate::aif::NONE;
 use crate::progressive::ProgressiveMesh;
@@ -31,21 +32,6 @@ enum Kind {
     Vertex,
     Middle,
     Quarter,
-}
-
-/// A triangle in a sphere.
-struct Reach {
-    corners: [DVec3; 3],
-    middle: DVec3,
-    radius: f64,
-}
-
-impl Reach {
-    fn of(corners: [DVec3; 3]) -> Reach {
-        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-        let radius = corners.iter().map(|c| c.distance(middle)).fold(0.0, f64::max) * (1.0 + 1e-9);
-        Reach { corners, middle, radius }
-    }
 }
 
 struct Walk<'a> {

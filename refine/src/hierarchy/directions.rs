@@ -1,6 +1,6 @@
 //! Which way deviations lie (Hoppe 1997, section 4: uniform and directional error): along the line of sight they hardly show.
 //!
-//! A sample p of the finest mesh is shown at its place q on the mesh. The error of a split bounds the length of D = q - p. Its [`Direction`], an axis n and an angle phi, bounds the rest: with the
+//! A place p of the finest mesh is shown at its place q on the mesh. (Of a piece the corners have theirs on one face; in between, the same mean of these serves, so bodies, which are convex, hold for all of it.) The error of a split bounds the length of D = q - p. Its [`Direction`], an axis n and an angle phi, bounds the rest: with the
 //! error E, D lies in the *body* of vectors that are no longer than E and whose part across n is at most E sin phi.
 //!
 //! **How large it looks.** Seen along the unit vector v, D counts as `sqrt(across^2 + (along / K)^2)`, with K = [`DEPTH`]: what deviates along the line of sight counts a K-th. (Nothing at all would be too little: another
