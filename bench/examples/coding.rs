@@ -1,7 +1,7 @@
 //! What reading and writing a `.pm` file takes: decodes the file so often, encodes what came out as often, and prints the best of each.
 //!
-//! `cargo run --release -p progmesh-refine --example coding -- in.pm [TIMES [read]]` (default: 5; time of the thread where the system tells it)
-use progmesh_refine::format::{EncodeOptions, decode, encode};
+//! `cargo run --release -p progmesh-bench --example coding -- in.pm [TIMES [read]]` (default: 5; time of the thread where the system tells it)
+use progmesh::refine::format::{EncodeOptions, decode, encode};
 use std::time::Instant;
 
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
