@@ -68,7 +68,7 @@ pub(crate) struct Needs {
     /// What to leave coarse however near it is
     #[arg(long, value_enum, default_value_t = CullName::All, help_heading = "View")]
     cull: CullName,
-    /// Read of a .pm only what is needed, and hold at most so many MiB of it: for files of any size, made by encode --paged
+    /// Read of a .pm only what is needed, and take at most so many MiB, the program and a grid's cache included: for files of any size, made by encode --paged or terrain build
     #[arg(long, value_name = "MIB", value_parser = args::positive, allow_negative_numbers = true, help_heading = "View")]
     pub(crate) memory: Option<usize>,
     #[command(flatten)]

@@ -108,7 +108,7 @@ impl Args {
         let mut warnings = Warnings::new(self.quiet);
         let file = self.input.name();
         // Before any work is done.
-        let source = self.path.open(&mut warnings)?;
+        let source = self.path.open(self.needs.memory, &mut warnings)?;
         self.needs.rule.check(self.needs.memory.is_some())?;
         self.check_truly()?;
         if self.path.has_grid() && self.needs.rule.deviation() == Deviation::Directional {

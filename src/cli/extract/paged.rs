@@ -21,7 +21,7 @@ impl Args {
         let failed = |e: &dyn std::fmt::Display| Failure::Input(format!("{file}: {e}"));
         let interrupt = Interrupt::watch();
         let report = common::in_pool(self.making.collapsing.threads, || {
-            let mut scene = paging::open(&self.input, mib)?;
+            let mut scene = paging::open(&self.input, mib, 0)?;
             let (read, refining) = (start.elapsed().as_secs_f64(), Instant::now());
             let most = self.needs.budget_faces;
             let tau =

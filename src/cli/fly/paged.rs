@@ -33,7 +33,8 @@ impl Args {
     ) -> Result<Report, Failure> {
         let file = self.input.name();
         let start = Instant::now();
-        let mut scene = paging::open(&self.input, mib)?;
+        let beside = if self.path.has_grid() { paging::grid_cache(mib) } else { 0 };
+        let mut scene = paging::open(&self.input, mib, beside)?;
         let read = start.elapsed().as_secs_f64();
         let course = self.path.lay(source, scene.bounds(), (&file, self.terrain()))?;
         if let Some(g) = course.ground.as_ref().filter(|_| self.terrain().is_some()) {

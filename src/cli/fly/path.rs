@@ -1,6 +1,7 @@
 //! `--path`, `--frames`, `--path-scale`, `--path-speed`, `--grid`: where a flight leads, and over what.
 
 use super::super::common::{Warnings, short};
+use super::super::paging::grid_cache;
 use super::super::terrain::input::{known_spacing, open_plain, unread};
 use super::super::{Failure, args};
 use glam::{DMat4, DVec3};
@@ -105,14 +106,14 @@ impl PathArgs {
         &self.path
     }
 
-    /// Reads what the flags name.
-    pub(super) fn open(&self, warnings: &mut Warnings) -> Result<Source, Failure> {
+    /// Reads what the flags name; `memory` is the limit, in MiB, of which a grid's cache takes its part.
+    pub(super) fn open(&self, memory: Option<usize>, warnings: &mut Warnings) -> Result<Source, Failure> {
         let path = match self.path.as_str() {
             "circle" | "lemniscate" => Vec::new(),
             path => files::read_all(Path::new(path)).map_err(|e| Failure::Input(format!("{path}: {e}")))?,
         };
         let Some(grid) = &self.grid else { return Ok(Source { path, grid: None }) };
-        Ok(Source { path, grid: Some(open_plain(grid, warnings)?) })
+        Ok(Source { path, grid: Some(open_plain(grid, memory.map(grid_cache), warnings)?) })
     }
 
     /// The cameras about something of these bounds, and the ground below them. `file` is the mesh's name, and `terrain` what it says of a grid.

@@ -137,10 +137,18 @@ impl GridInput {
     }
 }
 
-/// Opens one grid whose format its bytes or its name tell.
-pub(crate) fn open_plain(path: &Path, warnings: &mut Warnings) -> Result<GridFile, Failure> {
+/// Opens one grid whose format its bytes or its name tell, with a cache of so many bytes if that is said.
+pub(crate) fn open_plain(
+    path: &Path,
+    cache: Option<usize>,
+    warnings: &mut Warnings,
+) -> Result<GridFile, Failure> {
     let file = common::name(path, "standard input");
-    let grid = files::open_grid(path, &GridOptions::default()).map_err(|e| unopened(&file, &e))?;
+    let mut options = GridOptions::default();
+    if let Some(bytes) = cache {
+        options = options.with_cache(bytes);
+    }
+    let grid = files::open_grid(path, &options).map_err(|e| unopened(&file, &e))?;
     warnings.say(grid.warnings.iter().map(|w| format!("{file}: {w}")));
     Ok(grid)
 }
