@@ -264,6 +264,6 @@ fn matrices_that_place_nothing_are_refused() {
     p.write("nan.frames", "F 0  nan 0 1  1 0 0  0 1 0  0 0 0  0.5\n");
     p.write("zoom.frames", "F 0  0 0 1  1 0 0  0 1 0  0 0 0  0\n");
     p.run("fly in.glb --path nan.frames").failed(3, "nan.frames: line 1: nan: must be a number");
-    p.run("fly in.glb --path zoom.frames").failed(3, "zoom.frames: line 1: fov_y_deg is 0");
+    p.run("fly in.glb --path zoom.frames").failed(3, "zoom.frames: line 1: zoom is 0");
     assert!(!p.exists("out.ply"));
 }

@@ -76,12 +76,18 @@ class Track {
   step() {
     if (this.frame + 1 >= this.frames) return;
     for (const mesh of this.meshes) {
+      const before = mesh.slots;
       mesh.slots = this.number();
       if (3 * mesh.slots > mesh.corners.length) {
         const larger = new Uint32Array(Math.max(3 * mesh.slots, 2 * mesh.corners.length));
         larger.set(mesh.corners);
         mesh.corners = larger;
         mesh.ranges = null;
+      }
+      // Slots that come have no face until one is put there; there may have been one before.
+      if (mesh.slots > before) {
+        mesh.corners.fill(0, 3 * before, 3 * mesh.slots);
+        if (mesh.ranges) mesh.ranges.push([before, mesh.slots]);
       }
       let slot = 0;
       let corner = 0;
