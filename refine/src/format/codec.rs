@@ -263,9 +263,10 @@ impl Room {
     /// As much as there is.
     pub(crate) const ANY: Room = Room { context: u64::MAX, ring: usize::MAX };
 
-    /// What chunks of so many splits take: on two terrains, igea and dragon contexts have at most 1.01 times as many splits as their chunks, and rings some ten edges.
+    /// What chunks of so many splits take: on two terrains, igea and dragon contexts have at most 1.01 times as many splits as their chunks, and rings some ten edges. Of short last chunks the context
+    /// may be all of the first band, 6,144 splits (a scan of 20,000 faces).
     pub(crate) fn usual(count: u32) -> Room {
-        Room { context: count as u64 + count as u64 / 8 + 512, ring: 1024 }
+        Room { context: (count as u64 + count as u64 / 8 + 512).max(8192), ring: 1024 }
     }
 
     /// Bytes that reading takes at most on the way, besides the arrays that come of it and what `chunk` has in the file: all that grows is here with what it grows to, and what it grew from while that is copied.
