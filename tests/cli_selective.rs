@@ -190,8 +190,7 @@ fn triangles(p: &Place, file: &str) -> Vec<[[u64; 3]; 3]> {
     let mut numbers = text.lines().skip(1).filter(|l| !l.starts_with('#')).flat_map(str::split_whitespace);
     let mut next = || numbers.next().unwrap().parse::<f64>().unwrap();
     let [vertices, faces, _] = [next(), next(), next()].map(|n| n as usize);
-    let places: Vec<[u64; 3]> =
-        (0..vertices).map(|_| [next(), next(), next()].map(f64::to_bits)).collect();
+    let places: Vec<[u64; 3]> = (0..vertices).map(|_| [next(), next(), next()].map(f64::to_bits)).collect();
     let mut all: Vec<[[u64; 3]; 3]> = (0..faces)
         .map(|_| {
             assert_eq!(next(), 3.0);
