@@ -38,8 +38,9 @@ const LITTLE: f64 = 0.15;
 const TINY: f64 = 1e-7;
 /// What errors are raised by, of the diagonal: enough for thousands of cuts of one piece.
 const SLACK: f64 = 1e-11;
-/// Cuts of one piece by a collapse at most.
-const CUTS: u32 = 16;
+/// Cuts of one piece by a collapse at most, and for each face of the ring: a piece over the vertex of a fan has to be cut at all its edges (fandisk has fans of twenty).
+const CUTS: usize = 16;
+const CUTS_A_FACE: usize = 3;
 /// A piece beside all edges, whose error is more than so many times what its corners are from what is nearest to them, lies over a ring that is folded.
 const FOLDED: f64 = 1.3;
 
@@ -362,6 +363,7 @@ impl<'a> Walk<'a> {
         spare: &mut Vec<Vec<Corner>>,
     ) {
         let (mut cuts, mut parts) = (0, 0);
+        let most = CUTS + CUTS_A_FACE * ring.triangles.len();
         while let Some(piece) = stack.pop() {
             if piece.len() > CORNERS {
                 // Two with fewer corners.
@@ -378,10 +380,10 @@ impl<'a> Walk<'a> {
             }
             let (error, on) = best(&piece, ring.triangles);
             let far = piece.iter().map(|c| c.d).fold(0.0, f64::max);
-            if !ring.fits(error, &piece) && cuts < CUTS && self.cut(face, &piece, ring, stack, spare) {
+            if !ring.fits(error, &piece) && cuts < most && self.cut(face, &piece, ring, stack, spare) {
                 cuts += 1;
             } else if error > FOLDED * far + ring.little()
-                && parts < CUTS
+                && parts < most
                 && self.part(face, &piece, ring, stack, spare)
             {
                 parts += 1;
