@@ -61,6 +61,30 @@ struct Corner {
     on: usize,
 }
 
+impl Corner {
+    /// The weights of a place on the way to another corner.
+    #[inline]
+    fn towards(&self, other: &Corner, t: f64) -> [f64; 2] {
+        let (a, b) = (self.at, other.at);
+        [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t]
+    }
+}
+
+/// Pieces to be put, and lists of corners to be used again.
+#[derive(Default)]
+struct Pile {
+    stack: Vec<Vec<Corner>>,
+    spare: Vec<Vec<Corner>>,
+}
+
+impl Pile {
+    fn fresh(&mut self) -> Vec<Corner> {
+        let mut piece = self.spare.pop().unwrap_or_default();
+        piece.clear();
+        piece
+    }
+}
+
 /// The whole of a face.
 const WHOLE: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
 
@@ -105,9 +129,7 @@ struct Scratch {
     /// Corners of pieces, one after the other; and the face of each piece, and where its corners end.
     corners: Vec<Corner>,
     ends: Vec<(u32, u32)>,
-    /// Pieces to be put.
-    stack: Vec<Vec<Corner>>,
-    spare: Vec<Vec<Corner>>,
+    pile: Pile,
     fan: Vec<[u32; 3]>,
     between: Vec<Between>,
     ways: Vec<DVec3>,
@@ -149,11 +171,11 @@ pub(super) fn measure(pm: &ProgressiveMesh, forest: &Forest, front: Front, optio
     for i in (0..forest.len() as u32).rev() {
         let k = i as usize;
         let body = bodies.as_mut().map(|b| &mut b[k]);
-        // Those below have raised it to theirs.
+        // Those right below have raised it to their own.
         let error = walk.undo(i, errors[k], &mut extents[k], body);
         errors[k] = errors[k].max(error);
         if let Some(up) = errors.get_mut(ups[k] as usize) {
-            *up = up.max(error).max(0.0);
+            *up = up.max(error);
         }
     }
     let mut bounds = spheres::around(pm, forest, &finest, &extents);
@@ -261,11 +283,10 @@ impl<'a> Walk<'a> {
                 self.store(face, &piece, (error, on), false, &mut ring);
                 continue;
             }
-            let mut whole = s.spare.pop().unwrap_or_default();
-            whole.clear();
+            let mut whole = s.pile.fresh();
             whole.extend_from_slice(&piece);
-            s.stack.push(whole);
-            self.put(face, &mut ring, &mut s.stack, &mut s.spare);
+            s.pile.stack.push(whole);
+            self.put(face, &mut ring, &mut s.pile);
         }
         let mut from = 0;
         for group in s.ends.chunk_by(|a, b| a.0 == b.0) {
@@ -278,32 +299,29 @@ impl<'a> Walk<'a> {
                 s.hull.extend(all.iter().map(|c| c.at));
                 convex_hull(&mut s.hull);
                 let of = |at: &[f64; 2]| all.iter().find(|c| c.at == *at).copied();
-                let mut piece = s.spare.pop().unwrap_or_default();
-                piece.clear();
+                let mut piece = s.pile.fresh();
                 piece.extend(s.hull.iter().filter_map(of));
                 let (error, on) = best(&piece, &triangles);
                 let fits = piece.len() <= CORNERS && ring.fits(error, &piece);
                 if fits {
                     self.store(face, &piece, (error, on), true, &mut ring);
-                    s.spare.push(piece);
+                    s.pile.spare.push(piece);
                     from = to;
                     continue;
                 }
-                s.spare.push(piece);
+                s.pile.spare.push(piece);
             }
             for &(_, end) in group {
-                let mut piece = s.spare.pop().unwrap_or_default();
-                piece.clear();
+                let mut piece = s.pile.fresh();
                 piece.extend_from_slice(&s.corners[from..end as usize]);
                 from = end as usize;
-                s.stack.push(piece);
-                self.put(face, &mut ring, &mut s.stack, &mut s.spare);
+                s.pile.stack.push(piece);
+                self.put(face, &mut ring, &mut s.pile);
             }
         }
         let error = ring.error;
         if let Some(body) = body {
-            let normal = |t: &Reach| (t.corners[1] - t.corners[0]).cross(t.corners[2] - t.corners[0]);
-            *body = Body::around(&s.ways, triangles.iter().map(normal).sum());
+            *body = Body::around(&s.ways, triangles.iter().map(Reach::normal).sum());
         }
         self.scratch = s;
         if error > 0.0 { error * (1.0 + 1e-9) + SLACK * self.finest.diagonal } else { 0.0 }
@@ -355,42 +373,35 @@ impl<'a> Walk<'a> {
     }
 
     /// Puts the piece of a face that is on the stack, in pieces if need be.
-    fn put(
-        &mut self,
-        face: u32,
-        ring: &mut Ring<'_>,
-        stack: &mut Vec<Vec<Corner>>,
-        spare: &mut Vec<Vec<Corner>>,
-    ) {
+    fn put(&mut self, face: u32, ring: &mut Ring<'_>, pile: &mut Pile) {
         let (mut cuts, mut parts) = (0, 0);
         let most = CUTS + CUTS_A_FACE * ring.triangles.len();
-        while let Some(piece) = stack.pop() {
+        while let Some(piece) = pile.stack.pop() {
             if piece.len() > CORNERS {
                 // Two with fewer corners.
                 let (a, b) = piece.split_at(piece.len() / 2);
                 for (half, end) in [(a, b.first()), (b, a.first())] {
-                    let mut fewer = spare.pop().unwrap_or_default();
-                    fewer.clear();
+                    let mut fewer = pile.fresh();
                     fewer.extend(half.iter().chain(end).copied());
-                    stack.push(fewer);
+                    pile.stack.push(fewer);
                 }
                 cuts += 1;
-                spare.push(piece);
+                pile.spare.push(piece);
                 continue;
             }
             let (error, on) = best(&piece, ring.triangles);
             let far = piece.iter().map(|c| c.d).fold(0.0, f64::max);
-            if !ring.fits(error, &piece) && cuts < most && self.cut(face, &piece, ring, stack, spare) {
+            if !ring.fits(error, &piece) && cuts < most && self.cut(face, &piece, ring, pile) {
                 cuts += 1;
             } else if error > FOLDED * far + ring.little()
                 && parts < most
-                && self.part(face, &piece, ring, stack, spare)
+                && self.part(face, &piece, ring, pile)
             {
                 parts += 1;
             } else {
                 self.store(face, &piece, (error, on), cuts + parts > 0, ring);
             }
-            spare.push(piece);
+            pile.spare.push(piece);
         }
     }
 

@@ -17,6 +17,13 @@ impl Reach {
         Reach { corners, middle, radius: radius * (1.0 + 1e-9) }
     }
 
+    /// Its normal, twice its area long.
+    #[inline]
+    pub(super) fn normal(&self) -> DVec3 {
+        let [a, b, c] = self.corners;
+        (b - a).cross(c - a)
+    }
+
     /// A point is certainly farther from it.
     #[inline]
     pub(super) fn is_beyond(&self, p: DVec3, distance: f64) -> bool {

@@ -1,7 +1,7 @@
 //! How pieces are cut where they lie over several faces of a ring.
 
 use super::super::nearest::{Reach, nearest};
-use super::{CORNERS, Corner, ENOUGH, Ring, Walk};
+use super::{CORNERS, Corner, ENOUGH, Pile, Ring, Walk};
 use glam::DVec3;
 
 /// Steps by which a place is looked for where another face becomes the nearest.
@@ -35,14 +35,7 @@ impl Between {
 
 impl Walk<'_> {
     /// Cuts a piece between two faces of the ring; false if it lies beside all their edges.
-    pub(super) fn cut(
-        &self,
-        face: u32,
-        piece: &[Corner],
-        ring: &Ring<'_>,
-        stack: &mut Vec<Vec<Corner>>,
-        spare: &mut Vec<Vec<Corner>>,
-    ) -> bool {
+    pub(super) fn cut(&self, face: u32, piece: &[Corner], ring: &Ring<'_>, pile: &mut Pile) -> bool {
         let n = piece.len();
         let mut best: Option<(f64, &Between)> = None;
         for between in ring.between {
@@ -68,12 +61,7 @@ impl Walk<'_> {
         }
         let Some((_, between)) = best else { return false };
         let sides = between.sides(piece, ring.own);
-        let mut fresh = || {
-            let mut half = spare.pop().unwrap_or_default();
-            half.clear();
-            half
-        };
-        let mut halves = [fresh(), fresh()];
+        let mut halves = [pile.fresh(), pile.fresh()];
         for k in 0..n {
             let (x, y) = (sides[k], sides[(k + 1) % n]);
             // What is on the plane is of both.
@@ -85,26 +73,18 @@ impl Walk<'_> {
             }
             if x * y < 0.0 {
                 let t = x / (x - y);
-                let (a, b) = (piece[k].at, piece[(k + 1) % n].at);
-                let at = [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t];
+                let at = piece[k].towards(&piece[(k + 1) % n], t);
                 let p = self.finest.at(face, at);
                 let (d, on) = nearest(p, ring.triangles);
                 halves.iter_mut().for_each(|h| h.push(Corner { at, p, d, on }));
             }
         }
-        stack.extend(halves);
+        pile.stack.extend(halves);
         true
     }
 
     /// Cuts off the longest run of corners to which one face is nearest, where another becomes so: for rings that are folded. False if one is nearest to all.
-    pub(super) fn part(
-        &self,
-        face: u32,
-        piece: &[Corner],
-        ring: &Ring<'_>,
-        stack: &mut Vec<Vec<Corner>>,
-        spare: &mut Vec<Vec<Corner>>,
-    ) -> bool {
+    pub(super) fn part(&self, face: u32, piece: &[Corner], ring: &Ring<'_>, pile: &mut Pile) -> bool {
         let n = piece.len();
         let run = |k: usize| (0..n).take_while(|j| piece[(k + j) % n].on == piece[k].on).count();
         let starts = (0..n).filter(|&k| piece[(k + n - 1) % n].on != piece[k].on);
@@ -115,7 +95,7 @@ impl Walk<'_> {
             let (mut last, mut beyond, mut lo, mut hi) = (a, b.on, 0.0, 1.0);
             for _ in 0..HALVES {
                 let t = 0.5 * (lo + hi);
-                let at = [a.at[0] + (b.at[0] - a.at[0]) * t, a.at[1] + (b.at[1] - a.at[1]) * t];
+                let at = a.towards(&b, t);
                 let p = self.finest.at(face, at);
                 let (d, on) = nearest(p, ring.triangles);
                 if on == a.on {
@@ -127,19 +107,14 @@ impl Walk<'_> {
             (last, Corner { on: beyond, ..last })
         };
         let (first, last) = (end(of(0), of(n - 1)), end(of(len - 1), of(len)));
-        let mut fresh = || {
-            let mut part = spare.pop().unwrap_or_default();
-            part.clear();
-            part
-        };
-        let (mut own, mut rest) = (fresh(), fresh());
+        let (mut own, mut rest) = (pile.fresh(), pile.fresh());
         own.push(first.0);
         own.extend((0..len).map(of));
         own.push(last.0);
         rest.push(last.1);
         rest.extend((len..n).map(of));
         rest.push(first.1);
-        stack.extend([rest, own]);
+        pile.stack.extend([rest, own]);
         true
     }
 }
@@ -173,8 +148,7 @@ pub(super) fn best(piece: &[Corner], triangles: &[Reach]) -> (f64, usize) {
 /// The planes between the faces around a vertex.
 pub(super) fn between(own: u32, fan: &[[u32; 3]], triangles: &[Reach], out: &mut Vec<Between>) {
     out.clear();
-    let normal =
-        |t: &Reach| (t.corners[1] - t.corners[0]).cross(t.corners[2] - t.corners[0]).normalize_or_zero();
+    let normal = |t: &Reach| t.normal().normalize_or_zero();
     let corner = |f: &[u32; 3]| f.iter().position(|&v| v == own);
     for (f, t) in fan.iter().zip(triangles) {
         let Some(k) = corner(f) else { continue };
