@@ -8,6 +8,7 @@
 
 mod code;
 mod number;
+mod spool;
 mod store;
 
 pub use code::Coded;
@@ -15,8 +16,9 @@ pub use store::{InMemory, Store};
 
 use crate::refine::ProgressiveMesh;
 use crate::terrain::block::{Block, BlockError, BlockHead, Layout, Relief, Sheet, join, leaf};
-use crate::terrain::{Raster, RasterError, Window, windows};
+use crate::terrain::{Raster, RasterError};
 use number::{Assembly, Frame, MOST_FACES, Numbers};
+use spool::Heights;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// How a progressive terrain is made. Start from `Options::default()` and set what differs.
@@ -222,7 +224,8 @@ pub fn blocks<'a>(
     if !scale.into_iter().all(|s| (1e-12..1e12).contains(&s)) {
         return Err(BuildError::Spacing);
     }
-    let frame = Frame::new(scale, greatest(raster, control)?);
+    let (heights, greatest) = Heights::of(raster, options, store, control)?;
+    let frame = Frame::new(scale, greatest);
     let layout = layout.with_scale(scale).with_slack(frame.slack(columns, rows));
     let levels = layout.levels();
     let total: usize = (0..levels).map(|l| layout.blocks(l).iter().product::<usize>()).sum();
@@ -233,7 +236,7 @@ pub fn blocks<'a>(
         true if rounding > 0.0 => (options.floor - rounding).next_down(),
         _ => options.floor,
     };
-    let work = Work { raster, layout, options, floor, store, control };
+    let work = Work { heights, layout, options, floor, store, control };
     let (done, found) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let mut heads: Vec<Vec<BlockHead>> = vec![];
     for level in 0..levels {
@@ -283,20 +286,6 @@ pub fn blocks<'a>(
     Ok(Blocks { work, heads, root, frame, figures })
 }
 
-/// The greatest height of a grid, without its sign.
-fn greatest(raster: &dyn Raster, control: &dyn Control) -> Result<f64, BuildError> {
-    let all: Vec<_> = windows(raster, 1 << 20).collect();
-    let one = |w: &Window| {
-        if control.cancelled() {
-            return Err(BuildError::Cancelled);
-        }
-        let grid = raster.window(*w)?;
-        // NaN gives way.
-        Ok(grid.heights().iter().fold(0.0f64, |most, h| most.max(h.abs())))
-    };
-    Ok(each(&all, one)?.into_iter().fold(0.0, f64::max))
-}
-
 /// The blocks of a level, row by row.
 fn in_rows(layout: &Layout, level: u32) -> Vec<[usize; 2]> {
     let [across, down] = layout.blocks(level);
@@ -327,7 +316,7 @@ fn threads() -> usize {
 }
 
 struct Work<'a> {
-    raster: &'a dyn Raster,
+    heights: Heights<'a>,
     layout: Layout,
     options: &'a Options,
     /// That of the options, less what rounding of the mesh adds.
@@ -363,12 +352,12 @@ impl Work<'_> {
         }
         let mut below = vec![];
         let block = if level == 0 {
-            leaf(self.raster, &self.layout, at, self.floor)?
+            leaf(self.heights.raster(), &self.layout, at, self.floor)?
         } else {
             below = children(&self.layout, level, at);
             let sheets = below.iter().map(|&child| self.sheet(level - 1, child)).collect::<Result<_, _>>()?;
             let window = self.layout.window(level, at);
-            let relief = Relief::read(self.raster, window, self.options.most_heights())?;
+            let relief = Relief::read(self.heights.raster(), window, self.options.most_heights())?;
             join(sheets, &relief, &self.layout.rules(level, at, 0))?
         };
         self.store.put(&sheet_name, &block.sheet.to_bytes())?;

@@ -267,3 +267,16 @@ fn matrices_that_place_nothing_are_refused() {
     p.run("fly in.glb --path zoom.frames").failed(3, "zoom.frames: line 1: zoom is 0");
     assert!(!p.exists("out.ply"));
 }
+
+#[test]
+fn what_views_share_takes_at_most_64_bytes_a_vertex_with_normals() {
+    let p = Place::new();
+    p.generate("scan", "in.ply", 12000);
+    p.done("convert in.ply n.ply --normals recompute -q");
+    p.done("encode n.ply n.pm -q");
+    for from in ["n.pm", "n.ply --placement optimal", "n.ply --placement endpoint"] {
+        let r = p.done(&format!("fly {from} --path circle --frames 2 --json -q")).json();
+        let each = r["memory"]["shared_bytes_per_vertex"].as_f64().unwrap();
+        assert!(each > 30.0 && each <= 64.0, "{from}: {each}");
+    }
+}

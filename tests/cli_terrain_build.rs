@@ -222,3 +222,21 @@ fn what_cannot_be_built_is_said() {
     assert!(p.files().iter().all(|f| !f.contains("a.pm")), "{:?}", p.files());
     p.done("terrain build high.raw a.pm --size 10x10 --type f64 -q");
 }
+
+#[test]
+fn a_flat_base_says_how_large_the_whole_is() {
+    let p = Place::new();
+    // A peak, so that nothing of the height is in the base.
+    let mut text = "ncols 33\nnrows 33\nxllcorner 0\nyllcorner 0\ncellsize 1\n".to_string();
+    for k in 0..33 * 33 {
+        let height = if k == 16 * 33 + 16 { 40 } else { (k % 33) / 16 };
+        text += &format!("{height}{}", if k % 33 == 32 { '\n' } else { ' ' });
+    }
+    p.write("peak.asc", text);
+    p.done("terrain build peak.asc peak.pm --block 8 -q");
+    // The grid is found where the mesh stands only if its box is right.
+    let fly = "fly peak.pm --grid peak.asc --path circle --frames 3 --cull frustum --memory 64 --measure-every 1 --json -q";
+    let r = p.done(fly).json();
+    assert_eq!((r["cracks"].as_u64(), r["uncovered"].as_u64()), (Some(0), Some(0)));
+    assert!(r["measured_over_tau"]["max"].as_f64().unwrap() <= 1.0);
+}

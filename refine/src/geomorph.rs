@@ -5,6 +5,7 @@
 
 use crate::aif::{Channel, MeshInput, NONE, Positions, Semantic, Wedges};
 use crate::progressive::{Cursor, Damage, ProgressiveMesh};
+use rustc_hash::FxHashMap;
 use std::ops::Deref;
 
 /// Why there is no geomorph.
@@ -21,7 +22,7 @@ pub enum GeomorphError {
 
 /// A way between two states of a progressive mesh, from the coarser at `a = 0` to the finer at `a = 1`.
 ///
-/// Guaranteed: at 1 it is the finer mesh bit for bit. At 0 the faces that the coarser mesh has too are its faces, in its order and with its
+/// Guaranteed: at 1 it is the finer mesh bit for bit; where that is full detail and [`ProgressiveMesh::order`] is there, with the attributes of the input, down to the sign of a zero. At 0 the faces that the coarser mesh has too are its faces, in its order and with its
 /// positions and attributes bit for bit, and all others have two corners in one vertex of it, so that leaving those out leaves the
 /// coarser mesh. A vertex that does not differ stays bit for bit at every `a`. Between, positions, colours, texture coordinates and
 /// other numbers run linearly; normals and tangents are brought to unit length; joint indices, a tangent's handedness, and what only one end
@@ -131,7 +132,7 @@ impl Geomorph {
         let mut cursor = pm.cursor()?;
         cursor.seek(one.min(other))?;
         let coarse = cursor.clone();
-        let wedge_ancestors = cursor.seek_with_descent(one.max(other))?;
+        let mut wedge_ancestors = cursor.seek_with_descent(one.max(other))?;
         let first = coarse.vertex_count() as u32;
         let mut vertex_ancestors: Vec<u32> = (0..first).collect();
         for &v in &pm.splits.vertex[coarse.position()..cursor.position()] {
@@ -140,11 +141,23 @@ impl Geomorph {
             vertex_ancestors.push(from);
         }
         let start = coarse.positions().gather(&vertex_ancestors);
-        let attributes =
+        let mut attributes =
             pm.wedges.as_ref().map(|w| Ends::new(w.channels.clone(), &coarse, &cursor, &wedge_ancestors));
+        let mut faces = cursor.indices().to_vec();
+        if let (Some(ends), Some((input, corners))) = (&mut attributes, cursor.corrections()) {
+            let apart = coarse.position() != cursor.position();
+            let mut made = FxHashMap::default();
+            for (f, k, w) in corners {
+                let slot = faces[f][k];
+                faces[f][k] = *made.entry((slot, w)).or_insert_with(|| {
+                    wedge_ancestors.push(wedge_ancestors[slot as usize]);
+                    ends.correct(slot, &input, w, apart)
+                });
+            }
+        }
         Ok(Geomorph {
             fine: cursor.to_input(),
-            faces: cursor.indices().to_vec(),
+            faces,
             start,
             vertex_ancestors,
             wedge_ancestors,
@@ -168,7 +181,7 @@ impl Geomorph {
         &self.vertex_ancestors
     }
 
-    /// For every wedge of the finer mesh the one it comes from in the coarser.
+    /// For every wedge of the finer mesh the one it comes from in the coarser; at full detail there may be a few more than splits make.
     pub fn wedge_ancestors(&self) -> &[u32] {
         &self.wedge_ancestors
     }
@@ -223,6 +236,23 @@ impl Ends {
             start_present.push(coarse.present(from));
         }
         Ends { mix: Mix::new(&channels), start, end, start_present, end_present }
+    }
+
+    /// Adds a wedge that ends as wedge `w` of the input ([`NONE`]: without attributes), and begins as wedge `slot`, or does not change. Returns its number.
+    fn correct(&mut self, slot: u32, input: &Wedges, w: u32, apart: bool) -> u32 {
+        let (stride, new) = (self.mix.stride, self.end_present.len() as u32);
+        let (row, present) =
+            if w == NONE { (vec![0.0; stride], 0) } else { (input.row(w).to_vec(), input.present(w)) };
+        let s = slot as usize;
+        let (first, has) = match apart {
+            true => (self.start[s * stride..(s + 1) * stride].to_vec(), self.start_present[s]),
+            false => (row.clone(), present),
+        };
+        self.start.extend(first);
+        self.start_present.push(has);
+        self.end.extend(row);
+        self.end_present.push(present);
+        new
     }
 
     /// The wedges at `a`; `None` if the channels are no channels.

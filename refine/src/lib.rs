@@ -26,6 +26,7 @@
 pub mod format;
 pub mod geomorph;
 pub mod hierarchy;
+mod packed;
 pub mod paged;
 pub mod progressive;
 mod record;

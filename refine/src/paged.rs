@@ -10,15 +10,20 @@
 //!
 //! Guaranteed: at rest, with room and fetches enough, the mesh is that of a [`crate::selective::View`] with the same bounds, the least closed set; at every time the set is closed, so there are
 //! no cracks. [`PagedView::bytes`] never exceeds the limit: where that is too small, or fetches are limited, the mesh is coarser than asked, and
-//! [`PagedDone`] says so. Damage found on the way is an error that leaves the mesh as it was.
+//! [`PagedDone`] says so. Damage found on the way is an error that leaves the mesh somewhere between that of the last frame and that of this, sound and closed.
+//!
+//! Where the source can be read by other threads, up to an eighth of what is free at the first frame is set aside, whatever the number of threads, for pages that they decode before they are needed
+//! (`ahead.rs`); [`PagedView::trim`] does not give it back.
 //!
 //! Not guaranteed: what order the input had (`ORDR` is not read): vertices and faces come in the order of the file. Edges without faces come with the base.
 
 mod adapt;
+mod ahead;
 mod front;
 mod list;
 mod output;
 mod page;
+mod ready;
 mod shelf;
 mod timed;
 
@@ -100,10 +105,14 @@ pub struct PagedView<S> {
     /// Needed splits, the most urgent on top; empty between frames.
     queue: std::collections::BinaryHeap<(u16, std::cmp::Reverse<u32>)>,
     closure: Vec<u32>,
+    /// Splits that were applied and whose nodes have not been looked at.
+    made: Vec<u32>,
     resume: [usize; 2],
     clock: Clocks,
     /// The last frame did not look at all that was due.
     cut: bool,
+    /// There was a frame.
+    begun: bool,
     limit: usize,
 }
 
@@ -137,9 +146,11 @@ impl<S: ByteRanges> PagedView<S> {
             last: List::default(),
             queue: Default::default(),
             closure: Vec::new(),
+            made: Vec::new(),
             resume: [0; 2],
             clock,
             cut: false,
+            begun: false,
             limit,
         };
         view.open.reserve_to(vertices);
@@ -207,7 +218,8 @@ impl<S: ByteRanges> PagedView<S> {
     ///
     /// Errors: as there.
     pub fn lens(&self, camera: &Camera, placed: &DMat4, tau: f64, cull: Cull) -> Result<Lens, LensError> {
-        Lens::about(self.shelf.base.links.origin, camera, placed, tau, cull)
+        let links = &self.shelf.base.links;
+        Ok(Lens::about(links.origin, camera, placed, tau, cull)?.within(links.diagonal))
     }
 
     /// The box about the vertices of the base; `None` if it has none.
@@ -244,7 +256,7 @@ impl<S: ByteRanges> PagedView<S> {
             + self.open.bytes()
             + self.last.bytes()
             + 8 * self.queue.capacity()
-            + 4 * self.closure.capacity()
+            + 4 * (self.closure.capacity() + self.made.capacity())
             + MOTION * self.motions.as_ref().map_or(0, Motions::len)
             + CHANGE * self.ahead
             + self.beside * self.vertices
@@ -271,6 +283,17 @@ impl<S: ByteRanges> PagedView<S> {
         self.shelf.clock += 1;
         while self.shelf.evict_one() {}
         before - self.shelf.bytes()
+    }
+
+    /// Before the first frame, when others have what they cannot do without, sets room aside for pages that are made ahead; gives it back once the limit has become too small.
+    fn set_aside(&mut self) {
+        let free = self.limit.checked_sub(self.bytes() + self.shelf.most_at_once());
+        match free {
+            None => self.shelf.set_aside(0),
+            Some(free) if !self.begun => self.shelf.set_aside(free),
+            Some(_) => {}
+        }
+        self.begun = true;
     }
 
     /// True once `more` bytes fit beside what is held; pages that are not in use go if they must.

@@ -5,7 +5,7 @@
 //!
 //! Guaranteed: without hysteresis and limits, what is applied depends on the lens alone, whatever came before: the *least closed set* with all needed splits. At a
 //! tolerance of 0 without culling that is the finest mesh, at infinity the base. After every single step the mesh is one that the progressive mesh's splits make
-//! in another order, so it has no cracks, and its links are sound. Faces keep their slots in the index buffer for as long as they are there. What is
+//! in another order, so it has no cracks, and its links are sound. Faces keep their slots in the index buffer, unless many slots have come free: then the last faces move into these, which is among the changes. What is
 //! shown where the lens looks deviates by no more pixels than the tolerance, as far as [`crate::hierarchy`] says what its errors bound.
 //!
 //! With feature `parallel` long lists of splits are decided about by the threads of the pool that [`View::adapt`] is called in; what it does, to the order of slots, is the same for every
@@ -24,18 +24,21 @@ mod lens;
 mod morph;
 mod motions;
 mod output;
+mod pack;
 mod patch;
 mod queue;
 mod refine;
 mod regulator;
 mod sieve;
+mod survey;
 mod timed;
+mod timed_rows;
 
 pub(crate) use adapt::Meter;
 pub use adapt::{Done, Limits};
 pub use changes::Changes;
 pub(crate) use changes::take_runs;
-pub(crate) use clock::{Clock, Clocks, Due, Judges};
+pub(crate) use clock::{Clock, Clocks, Due, Judges, Looked, Many};
 pub(crate) use cut::{Cut, morphed};
 pub(crate) use entry::Entry;
 pub(crate) use front::Front;
@@ -65,13 +68,13 @@ impl Split {
 
 /// A mesh between base and full detail, finer where a view needs it.
 ///
-/// Memory: 62 B for every vertex shown, index buffer and links between faces included (and a part in 32 to grow into), and 3 bits (8 B with attributes) for every vertex of the finest mesh;
+/// Memory: 62 B for every vertex shown, index buffer and links between faces included (and a part in 32 to grow into, and one in 64 that may be free), and 3 bits (8 B with attributes) for every vertex of the finest mesh;
 /// [`View::bytes`] counts.
 #[derive(Clone, Debug)]
 pub struct View {
     hierarchy: Arc<Hierarchy>,
     front: Front,
-    /// Bits for walks over what a split depends on; none is set between walks.
+    /// Bits for walks over what splits depend on; none is set between frames.
     marked: Vec<u64>,
     clock: Clock,
     /// The record at which a limit cut short the last frame's looks.
@@ -136,7 +139,7 @@ impl View {
         assert!(i < self.hierarchy.splits(), "split {i} of {}", self.hierarchy.splits());
         let legal = self.front.is_applied(i as u32) && self.is_free(i as u32);
         if legal {
-            self.undo(i as u32);
+            self.undo(i as u32, &mut Vec::new());
         }
         legal
     }
@@ -144,7 +147,7 @@ impl View {
     /// True if all that split `i` depends on is applied, and it is not. Panics if there is no such split.
     pub fn may_split(&self, i: usize) -> bool {
         !self.is_applied(i)
-            && self.hierarchy.forest.needs.of(i as u32).iter().all(|&d| self.front.is_applied(d))
+            && self.hierarchy.forest.needs.of(i as u32).iter().all(|d| self.front.is_applied(d))
     }
 
     /// True if split `i` is applied and nothing applied depends on it. Panics if there is no such split.
@@ -158,35 +161,45 @@ impl View {
         (shown, tables + 8 * self.marked.len())
     }
 
-    /// Appends split `i` and all it depends on that is not applied, in an order in which they can be; false (and nothing of use) if that are more than `most`.
+    /// Replaces `out` by split `i` and all it depends on that is not applied, in an order in which they can be; false (and nothing of use) if that are more than `most`.
     fn closure(&mut self, i: u32, most: usize, out: &mut Vec<u32>) -> bool {
+        out.clear();
+        let fits = self.mark(std::iter::once(i), most, out);
+        self.unmark(out);
+        // What a split depends on was made before it.
+        out.sort_unstable();
+        fits
+    }
+
+    /// Marks splits and all they depend on, as far as it is neither applied nor marked, and appends what it has marked to `out`; false if it has stopped on the way, as that are more than `most`.
+    fn mark(&mut self, splits: impl Iterator<Item = u32>, most: usize, out: &mut Vec<u32>) -> bool {
+        let (front, needs, marked) = (&self.front, &self.hierarchy.forest.needs, &mut self.marked);
+        let mut add = |i: u32, out: &mut Vec<u32>| {
+            let (word, bit) = (i as usize / 64, 1u64 << (i % 64));
+            if marked[word] & bit == 0 && !front.is_applied(i) {
+                marked[word] |= bit;
+                out.push(i);
+            }
+        };
         let from = out.len();
-        // Mostly all of it is.
-        if !self.front.is_applied(i)
-            && self.hierarchy.forest.needs.of(i).iter().all(|&d| self.front.is_applied(d))
-        {
-            out.push(i);
-            return most > 0;
-        }
-        if !self.front.is_applied(i) {
-            self.marked[i as usize / 64] |= 1 << (i % 64);
-            out.push(i);
-        }
+        splits.for_each(|i| add(i, out));
         let mut k = from;
         while let Some(&j) = out.get(k).filter(|_| out.len() - from <= most) {
-            for &d in self.hierarchy.forest.needs.of(j) {
-                let (word, bit) = (d as usize / 64, 1u64 << (d % 64));
-                if self.marked[word] & bit == 0 && !self.front.is_applied(d) {
-                    self.marked[word] |= bit;
-                    out.push(d);
-                }
-            }
+            needs.of(j).iter().for_each(|d| add(d, out));
             k += 1;
         }
-        out[from..].iter().for_each(|&j| self.marked[j as usize / 64] &= !(1 << (j % 64)));
-        // What a split depends on was made before it.
-        out[from..].sort_unstable();
         out.len() - from <= most
+    }
+
+    /// Takes marks away.
+    fn unmark(&mut self, splits: &[u32]) {
+        splits.iter().for_each(|&j| self.marked[j as usize / 64] &= !(1 << (j % 64)));
+    }
+
+    /// Split `i` is marked.
+    #[inline]
+    fn is_marked(&self, i: u32) -> bool {
+        self.marked[i as usize / 64] >> (i % 64) & 1 != 0
     }
 
     /// Finds where the cuts of splits lie, as far as their faces are there, and reads what applying them begins with: the processor then waits for all of that together.
@@ -213,40 +226,39 @@ impl View {
         for r in [record, old] {
             self.front.records[r as usize].due = self.clock.now();
         }
-        for &d in h.forest.needs.of(i) {
+        for d in h.forest.needs.of(i).iter() {
             let r = self.front.record(d) as usize;
             self.front.records[r].dependents += 1;
         }
     }
 
-    /// Undoes split `i`, which is applied and free. Its vertex is due, since before now, by which it is told from those that have been looked at; and so is what has become free.
-    fn undo(&mut self, i: u32) {
+    /// Undoes split `i`, which is applied and free; what has become free by that is appended to `freed`. All these are due, and the vertex.
+    fn undo(&mut self, i: u32, freed: &mut Vec<u32>) {
         let h = &*self.hierarchy;
         self.front.unsplit(h.mesh(), &h.forest, i);
         let old = self.front.record_of_vertex(h.mesh().splits.vertex[i as usize]);
-        self.front.records[old as usize].due = self.clock.now().wrapping_sub(1);
-        for &d in h.forest.needs.of(i) {
+        let now = self.clock.now();
+        self.front.records[old as usize].due = now;
+        for d in h.forest.needs.of(i).iter() {
             let r = self.front.record(d) as usize;
             let record = &mut self.front.records[r];
             record.dependents -= 1;
-            if record.dependents == 0 && !Clock::has_come(self.clock.now(), record.due) {
-                record.due = self.clock.now();
+            if record.dependents == 0 {
+                record.due = now;
+                freed.push(d);
             }
         }
+    }
+
+    /// Reads what undoing splits, which are applied, begins with.
+    fn fetch_made(&self, splits: &[u32]) {
+        let sum = splits.iter().fold(0, |sum, &i| sum ^ self.front.fetch_made(i));
+        std::hint::black_box(sum);
     }
 
     /// Split `i`, which is applied, has nothing applied that depends on it, in the hierarchy or beside it.
     #[inline]
     fn is_free(&self, i: u32) -> bool {
         self.front.records[self.front.record(i) as usize].dependents == 0
-    }
-
-    /// The split that would come next at the vertex of a record that is there, that vertex, and how many of its splits come before; nothing for a leaf.
-    #[inline]
-    fn next(&self, record: u32) -> Option<(u32, u32, usize)> {
-        let h = &*self.hierarchy;
-        let v = self.front.vertex_of_record(record);
-        let k = self.front.turns(&h.forest, v);
-        h.forest.chain(v).get(k).map(|&i| (i, v, k))
     }
 }

@@ -54,7 +54,7 @@ fn what_is_undone_at_its_tolerance_changes_no_corner() {
                     let (x, y) = (view.morphed_row(&lenses, a, BAND), without.morphed_row(&lenses, b, BAND));
                     assert!(x.is_some() && x == y, "{name}: split {i}, wedges {a} and {b}: {x:?} {y:?}");
                     let (row, own) = (x.unwrap().0, view.row(a).0);
-                    between += (row != own && row != without.row(b).0) as usize;
+                    between += (row != *own && row != *without.row(b).0) as usize;
                     let length = row[..3].iter().map(|x| x * x).sum::<f32>().sqrt();
                     assert!(!normals || (length - 1.0).abs() < 1e-4, "{row:?}");
                 }

@@ -4,14 +4,18 @@ mod common;
 
 use common::{NAMES, assert_same, options, sample};
 use glam::{DMat4, DVec3};
-use progmesh_refine::format::{EncodeError, EncodeOptions, FormatError, RangeReader, decode, encode};
+use progmesh_refine::format::{
+    ByteRanges, ChunkType, EncodeError, EncodeOptions, FormatError, RangeReader, decode, encode,
+};
 use progmesh_refine::hierarchy::{self, Bounds, Hierarchy};
 use progmesh_refine::paged::{PagedError, PagedLimits, PagedView};
 use progmesh_refine::progressive::build;
 use progmesh_refine::selective::{Cull, Done, Lens, Limits, TimedMorph, View};
 use progmesh_refine::simplify::{Method, Placement, Quiet};
 use progmesh_refine::view::{Camera, CameraParameters, Projection};
+use std::ops::Range;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Pixels, by frame: finest where a part is seen.
 const TAU: [f64; 3] = [1.0, 6.0, 12.0];
@@ -242,6 +246,76 @@ fn geomorphs_are_those_in_memory_frame_by_frame() {
             same(&view, &out);
             assert!(out.displaced().count() == 0);
         }
+    }
+}
+
+/// A file that other threads may read as well; where it is needed it is slow.
+struct Slow {
+    bytes: Arc<Vec<u8>>,
+    ahead: Arc<AtomicUsize>,
+}
+
+/// Its other end.
+struct Quick(Arc<Vec<u8>>, Arc<AtomicUsize>);
+
+impl ByteRanges for Slow {
+    fn fetch(&self, range: Range<u64>) -> std::io::Result<Vec<u8>> {
+        std::thread::sleep(std::time::Duration::from_millis(2));
+        self.bytes.as_slice().fetch(range)
+    }
+
+    fn shared(&self) -> Option<Arc<dyn ByteRanges + Send + Sync>> {
+        Some(Arc::new(Quick(self.bytes.clone(), self.ahead.clone())))
+    }
+}
+
+impl ByteRanges for Quick {
+    fn fetch(&self, range: Range<u64>) -> std::io::Result<Vec<u8>> {
+        self.1.fetch_add(1, Ordering::Relaxed);
+        self.0.as_slice().fetch(range)
+    }
+}
+
+/// What other threads make ahead changes nothing that is shown, told or counted, whatever their number and the limit; damage neither.
+#[test]
+fn pages_made_ahead_change_nothing() {
+    let bytes = file("scan", 24_000, None);
+    let mut damaged = bytes.clone();
+    let chunks = RangeReader::new(&bytes[..]).unwrap().directory().chunks.clone();
+    let some = chunks.iter().filter(|c| c.kind == ChunkType::SPLITS).nth(3).unwrap();
+    damaged[(some.offset + some.stored / 2) as usize] ^= 0x10;
+    let fly = |bytes: &[u8], limit: usize, threads: usize| {
+        let (bytes, ahead) = (Arc::new(bytes.to_vec()), Arc::new(AtomicUsize::new(0)));
+        let source = Slow { bytes, ahead: ahead.clone() };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let frames = pool.install(|| {
+            let mut view = PagedView::new(Arc::new(RangeReader::new(source).unwrap()), 0, limit).unwrap();
+            let (centre, diagonal) = view.extent();
+            let mut frames = Vec::new();
+            for k in 0..14 {
+                // Nearer, and around it.
+                let c = camera(centre, diagonal, 0.02 * k as f64, 1.1 - 0.05 * k as f64);
+                let lens = view.lens(&c, &DMat4::IDENTITY, 2.0, Cull::Frustum).unwrap();
+                let done = view.adapt(&[lens], &PagedLimits::default());
+                assert!(view.bytes() <= limit, "{} of {limit}", view.bytes());
+                frames.push((done, view.applied_splits().collect::<Vec<_>>(), view.traffic(), view.bytes()));
+            }
+            frames
+        });
+        (frames, ahead.load(Ordering::Relaxed))
+    };
+    let (roomy, none) = fly(&bytes, 64 << 20, 1);
+    assert!(none == 0 && roomy.iter().all(|f| f.0.as_ref().is_ok_and(|d| d.done.complete)));
+    assert!(roomy[0].3 < 64 << 20 && roomy.last().is_some_and(|f| f.2.chunks_decoded > 4));
+    // Too little for all frames, and for anything to be made ahead.
+    let tight = needed(&bytes) + (300 << 10);
+    for (bytes, limit) in [(&bytes, 64 << 20), (&bytes, tight), (&damaged, 64 << 20)] {
+        let (alone, none) = fly(bytes, limit, 1);
+        let (shared, ahead) = fly(bytes, limit, 3);
+        assert!(alone == shared && none == 0);
+        assert_eq!(ahead > 0, cfg!(feature = "parallel") && limit != tight);
+        let whole = alone.iter().all(|f| f.0.as_ref().is_ok_and(|d| d.done.complete));
+        assert_eq!(whole, limit != tight && bytes != &damaged);
     }
 }
 

@@ -446,9 +446,9 @@ fn with_a_normal_a_vertex_takes_less_than_64_bytes() {
         assert_eq!(pm.splits.len() + pm.base_vertices(), mesh.vertex_count());
         pm.bytes() as f64 / pm.vertices() as f64
     };
-    // References, code and error 18 B, place and normal 12 B each; where collapses place vertices anew as much again for the one that is split.
+    // References, code and error 18 B, place 12 B, normal of unit length 9 B; where collapses place vertices anew as much again for the one that is split. (On a grid it is less: `tests/compact.rs`.)
     let kept = bytes(Placement::Endpoint);
-    assert!((42.0..43.0).contains(&kept), "{kept}");
+    assert!((39.0..40.0).contains(&kept), "{kept}");
     let moved = bytes(Placement::Optimal);
-    assert!((64.0..67.0).contains(&moved), "{moved}");
+    assert!((58.0..62.0).contains(&moved), "{moved}");
 }

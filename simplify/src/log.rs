@@ -115,6 +115,11 @@ pub fn record_all(
 }
 
 impl CollapseLog {
+    /// Room for the collapses of a mesh of so many vertices, at most.
+    pub(crate) fn for_vertices(vertices: usize) -> CollapseLog {
+        CollapseLog { steps: Vec::with_capacity(vertices), ..CollapseLog::default() }
+    }
+
     /// Where merging wedges writes down what it overwrites; [`CollapseLog::end_run`] ends it.
     pub(crate) fn notes(&mut self) -> Notes<'_> {
         Notes { corners: &mut self.corners, rows: &mut self.rows, values: &mut self.values }
@@ -135,10 +140,12 @@ impl CollapseLog {
         error: f32,
         left: usize,
     ) {
-        let mut wings = [LoggedWing::NO; 2];
-        for (to, wing) in wings.iter_mut().zip(record.wings()) {
-            *to = look_at_wing(t, wing, record.kept, record.edge);
-        }
+        let mut given = record.wings();
+        let mut look = || match given.next() {
+            Some(wing) => look_at_wing(t, wing, record.kept, record.edge),
+            None => LoggedWing::NO,
+        };
+        let wings = [look(), look()];
         let (kept, removed) = (record.kept.0, record.removed.0);
         self.steps.push(LoggedCollapse { kept, removed, wings, old_position, error, left: left as u32 });
     }
@@ -150,19 +157,23 @@ fn look_at_wing(t: &Topology, wing: &progmesh_aif::Wing, kept: VertexId, edge: E
     let [first, _] = t.edge_vertices(wing.kept_edge);
     let leaving = EdgeUse::new(wing.kept_edge, first != kept);
     let half = |g: FaceId| {
-        let uses = t.face_edges(g);
-        let i = if uses[0].edge() == wing.kept_edge {
-            0
-        } else if uses[1].edge() == wing.kept_edge {
-            1
-        } else {
-            2
+        // A triangle: only those are recorded.
+        let [a, b, c] = *t.face_edges(g) else { return (NONE, false) };
+        let (i, used) = match () {
+            _ if a.edge() == wing.kept_edge => (0, a),
+            _ if b.edge() == wing.kept_edge => (1, b),
+            _ => (2, c),
         };
-        (g.0 * 4 + i as u32, uses[i] == leaving)
+        (g.0 * 4 + i, used == leaving)
     };
     let nothing = (NONE, false);
     // What is gone keeps its relations: the merged edge still names the face it lost.
-    let beyond = t.edge_faces(wing.removed_edge).iter().copied().find(|&g| g != wing.face);
+    let beyond = match *t.edge_faces(wing.removed_edge) {
+        [f] if f == wing.face => None,
+        [f, ..] if f != wing.face => Some(f),
+        [_, ref rest @ ..] => rest.iter().copied().find(|&g| g != wing.face),
+        [] => None,
+    };
     let beside = match *t.edge_faces(wing.kept_edge) {
         [f] | [f, _] if Some(f) != beyond => half(f),
         [_, g] => half(g),

@@ -145,8 +145,9 @@ fn run_engines(
     // Nothing may be changed before all options are known to be good.
     let mut engines = Vec::with_capacity(meshes.len());
     for (i, (mesh, &scale)) in meshes.iter_mut().zip(scales).enumerate() {
+        let vertices = mesh.vertex_count();
         let mut engine = Engine::new(mesh, &options.of_mesh(i), epsilon, scale)?;
-        engine.log = logged.then(CollapseLog::default);
+        engine.log = logged.then(|| CollapseLog::for_vertices(vertices));
         engines.push(engine);
     }
     for engine in &mut engines {

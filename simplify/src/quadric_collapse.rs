@@ -73,7 +73,7 @@ fn run_all(
     for (i, (mesh, &scale)) in meshes.iter_mut().zip(scales).enumerate() {
         let options = &options.of_mesh(i);
         let mut collapser = Collapser::new(Work::new(mesh, options)?, options, scale);
-        collapser.log = logged.then(CollapseLog::default);
+        collapser.log = logged.then(|| CollapseLog::for_vertices(collapser.work.mesh.vertex_count()));
         collapsers.push(collapser);
     }
     // Costs are areas times squared distances; common ones are in diagonals of the largest mesh, in world units.

@@ -7,6 +7,7 @@ use crate::refine::format::ChunkType;
 use crate::refine::format::stream::{Next, Path, Tree, Written};
 use crate::refine::hierarchy::Guarantee;
 use crate::terrain::block::Vertex;
+use glam::DVec3;
 use std::cmp::Reverse;
 use std::io::Write;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -19,6 +20,8 @@ const WIDE: u32 = 3;
 pub struct Coded<'a> {
     blocks: &'a Blocks<'a>,
     tree: Tree,
+    /// The corners of the box of full detail.
+    extent: (DVec3, DVec3),
     /// The base, with what comes next at its vertices.
     next: Vec<Next>,
     /// Of the blocks in the order of the file.
@@ -65,7 +68,7 @@ impl Blocks<'_> {
                 next += self.heads[level as usize][k].collapses;
             }
         }
-        let tree = self.tree()?;
+        let (tree, extent) = self.tree()?;
         let run = Run { blocks: self, firsts, done: AtomicUsize::new(0), written: Mutex::default() };
         let mut path = Path::new(&tree);
         run.visit(&mut path, figures.levels - 1, [0, 0], &Numbers::of(&self.root))?;
@@ -76,10 +79,11 @@ impl Blocks<'_> {
             let [level, x, y] = *at;
             (Reverse(level), curve([x as usize, y as usize]))
         });
-        Ok(Coded { blocks: self, tree, next, written })
+        Ok(Coded { blocks: self, tree, extent, next, written })
     }
 
-    fn tree(&self) -> Result<Tree, BuildError> {
+    /// What is coded against, and the corners of the box.
+    fn tree(&self) -> Result<(Tree, (DVec3, DVec3)), BuildError> {
         // The corners of the box, and a sample of places.
         let levels = self.figures().levels;
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -90,12 +94,13 @@ impl Blocks<'_> {
             low = std::array::from_fn(|k| low[k].min(a[k]));
             high = std::array::from_fn(|k| high[k].max(b[k]));
         }
-        let [low, high] = [low, high].map(glam::DVec3::from_array);
+        let [low, high] = [low, high].map(DVec3::from_array);
         let like = self.frame.places(&self.work.block(levels - 1, [0, 0])?.vertices);
         let base: ProgressiveMesh = self.frame.base(&self.root);
         let splits = self.figures().splits as u32;
         let about = (0.5 * low + 0.5 * high, (high - low).length());
-        Tree::new(base, &like, splits, about, Guarantee::Vertical).ok_or_else(contradiction)
+        let tree = Tree::new(base, &like, splits, about, Guarantee::Vertical).ok_or_else(contradiction)?;
+        Ok((tree, (low, high)))
     }
 }
 
@@ -157,6 +162,11 @@ impl Run<'_> {
 }
 
 impl Coded<'_> {
+    /// Least and greatest coordinates of the mesh at full detail.
+    pub fn extent(&self) -> (DVec3, DVec3) {
+        self.extent
+    }
+
     /// Writes the file: a mesh in a `scene`, with chunks of other kinds beside. Returns how many bytes it has.
     ///
     /// # Errors

@@ -93,8 +93,8 @@ impl Frame {
         ProgressiveMesh {
             base_faces: root.faces.iter().map(|&[a, b, c]| [a, c, b]).collect(),
             base_positions: self.places(&root.vertices),
-            new_positions: self.room(0),
-            moved_positions: self.room(0),
+            new_positions: self.room(0).into(),
+            moved_positions: self.room(0).into(),
             ..ProgressiveMesh::default()
         }
     }
@@ -213,7 +213,7 @@ impl Assembly {
 
     /// The mesh that they make of a base.
     pub(super) fn mesh(self, base: ProgressiveMesh) -> Result<ProgressiveMesh, Damage> {
-        let mut mesh = ProgressiveMesh { splits: self.splits, new_positions: self.places, ..base };
+        let mut mesh = ProgressiveMesh { splits: self.splits, new_positions: self.places.into(), ..base };
         mesh.levels = vec![0, mesh.splits.len() as u32];
         mesh.levels.dedup();
         let errors: Vec<f64> = mesh.splits.error.iter().map(|&e| f64::from(e)).collect();

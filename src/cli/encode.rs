@@ -7,11 +7,10 @@ use super::control::{Interrupt, Progress};
 use super::ending::PmEnding;
 use super::method::Making;
 use progmesh::io::pm::encode_progressive;
-use progmesh::pipeline::{Job, build_progressive};
-use progmesh::refine::format::{EncodeOptions, RangeReader, suggested_grid};
+use progmesh::pipeline::build_progressive;
+use progmesh::refine::format::{EncodeOptions, RangeReader};
 use progmesh::refine::hierarchy;
-use progmesh::scene::Scene;
-use progmesh::simplify::{Method, Placement, Stop};
+use progmesh::simplify::Stop;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -59,16 +58,6 @@ fn bits(text: &str) -> Result<u32, String> {
     }
 }
 
-/// Places that collapses choose lie on a grid: far below any error that one sees, and a file with them is a fifth smaller.
-fn on_grid(mut job: Job, scene: &Scene) -> Job {
-    let options = &mut job.options;
-    if options.method == Method::Quadric && options.placement != Some(Placement::Endpoint) {
-        let cells = scene.meshes.iter().filter_map(|m| suggested_grid(&m.geometry.positions));
-        options.grid = options.grid.or(cells.min_by(f64::total_cmp));
-    }
-    job
-}
-
 impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
@@ -82,7 +71,7 @@ impl Args {
             let read = start.elapsed().as_secs_f64();
             interrupt.be_graceful();
             let progress = Progress::new(&interrupt, self.ending.quiet, "simplifying");
-            let job = on_grid(job, &scene);
+            let job = job.on_grid(&scene);
             let built = build_progressive(scene, &job, &progress)
                 .map_err(|e| Failure::Input(format!("{file}: {e}")))?;
             drop(progress);

@@ -131,6 +131,7 @@ pub(crate) fn make(
     let simplify = |scene: Scene, warnings: &mut Warnings| -> Result<ProgressiveScene, Failure> {
         interrupt.be_graceful();
         let progress = Progress::new(interrupt, quiet, "simplifying");
+        let job = job.clone().on_grid(&scene);
         let built = build_progressive(scene, &job, &progress).map_err(|e| failed(&e))?;
         if built.stop == Stop::Cancelled {
             return Err(Failure::Interrupted);

@@ -79,7 +79,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "K", value_parser = args::positive, allow_negative_numbers = true, help_heading = "Report")]
     measure_every: Option<usize>,
     /// Samples of the input to measure at
-    #[arg(long, value_name = "N", value_parser = args::positive, default_value = "100000",
+    #[arg(long, value_name = "N", value_parser = samples, default_value = "100000",
           allow_negative_numbers = true, help_heading = "Report")]
     samples: usize,
     #[command(flatten)]
@@ -94,6 +94,16 @@ pub(crate) struct Args {
     /// Say nothing but errors
     #[arg(long, short)]
     quiet: bool,
+}
+
+/// Samples are held in memory: a hundred times what is asked for without a word.
+const MOST_SAMPLES: usize = 10_000_000;
+
+fn samples(text: &str) -> Result<usize, String> {
+    args::positive(text).and_then(|n| match n {
+        n if n <= MOST_SAMPLES => Ok(n),
+        _ => Err(format!("must be 1 to {MOST_SAMPLES}")),
+    })
 }
 
 fn hysteresis(text: &str) -> Result<f64, String> {
@@ -254,5 +264,16 @@ impl Args {
             p.write(scene)?;
         }
         Ok((frames, bytes))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_would_take_all_memory_are_refused() {
+        assert_eq!((samples("1"), samples("1e7")), (Ok(1), Ok(MOST_SAMPLES)));
+        assert!(["0", "1e12", "x"].iter().all(|t| samples(t).is_err()));
     }
 }

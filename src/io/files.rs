@@ -576,7 +576,9 @@ impl WorkFolder {
     /// Errors: the system's.
     pub fn clear(&self) -> io::Result<()> {
         self.clear_temporary()?;
-        self.clear_by(|name| [".block", ".sheet", ".chunks"].iter().any(|end| name.ends_with(end)))?;
+        self.clear_by(|name| {
+            [".block", ".sheet", ".chunks", ".heights"].iter().any(|end| name.ends_with(end))
+        })?;
         self.clear_by(|name| name == BELONGS)
     }
 

@@ -4,9 +4,10 @@ use super::{Changes, Job, JobError, count, label, scale, world_scales};
 use crate::aif::{BuildOptions, Mesh, MeshInput, Weld};
 use crate::normals::{self, Normals};
 use crate::progressive::{Leftover, ProgressiveScene, shell_of};
+use crate::refine::format::suggested_grid;
 use crate::refine::progressive::{EncodeError, build_all};
 use crate::scene::{Extras, Scene};
-use crate::simplify::{Control, Stop};
+use crate::simplify::{Control, Method, Placement, Stop};
 use std::time::Instant;
 
 /// What came of [`build_progressive`].
@@ -25,6 +26,19 @@ pub struct Refinable {
     pub simplify_seconds: f64,
     /// What was changed that was not asked for, each said once.
     pub warnings: Vec<String>,
+}
+
+impl Job {
+    /// With the places that collapses choose on a grid, the finest that one of the meshes suggests: far below any error that one sees. Files are a fifth smaller then, and in memory places between base and full detail take half as
+    /// much. Only the quadric method chooses places, unless they are endpoints.
+    pub fn on_grid(mut self, scene: &Scene) -> Job {
+        let options = &mut self.options;
+        if options.method == Method::Quadric && options.placement != Some(Placement::Endpoint) {
+            let cells = scene.meshes.iter().filter_map(|m| suggested_grid(&m.geometry.positions));
+            options.grid = options.grid.or(cells.min_by(f64::total_cmp));
+        }
+        self
+    }
 }
 
 /// Makes progressive meshes of all meshes of `scene`, in one simplification with a shared order of splits.

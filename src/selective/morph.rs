@@ -1,5 +1,6 @@
 //! How changes of a scene show themselves.
 
+use super::shared::{Attributes, Drawn};
 use crate::refine::selective::{Changes, Lens, TimedMorph, View};
 use glam::DVec3;
 
@@ -39,6 +40,8 @@ pub(super) struct Morphs {
     /// Vertices of each mesh that are not in their own place, ascending, and where they are; empty if all are.
     displaced: Vec<Vec<(u32, DVec3)>>,
     morphing: usize,
+    /// By error: what the meshes are seen by.
+    lenses: Vec<Vec<Lens>>,
 }
 
 impl Morphs {
@@ -59,6 +62,16 @@ impl Morphs {
     /// The mesh that is drawn of mesh `m`.
     pub(super) fn view<'a>(&'a self, views: &'a [View], m: usize) -> &'a View {
         self.timed.get(m).map_or(&views[m], TimedMorph::view)
+    }
+
+    /// Mesh `m` as it is drawn.
+    pub(super) fn drawn<'a>(&'a self, views: &'a [View], m: usize) -> Drawn<'a> {
+        let attributes = match (self.geomorph, self.timed.get(m), self.lenses.get(m)) {
+            (_, Some(timed), _) => Attributes::Timed(timed),
+            (Some(Geomorph::Error { band }), _, Some(lenses)) => Attributes::ByError(lenses, band),
+            _ => Attributes::Own,
+        };
+        Drawn { view: self.view(views, m), displaced: self.displaced(m), attributes }
     }
 
     /// Views besides those of the scene.
@@ -88,6 +101,7 @@ impl Morphs {
             None => None,
             Some(Geomorph::Error { band }) => {
                 self.displaced = pairs().map(|(v, l)| displaced_by_error(v, l, band)).collect();
+                self.lenses = lenses.to_vec();
                 self.morphing = self.displaced.iter().map(Vec::len).sum();
                 None
             }
@@ -137,5 +151,51 @@ pub(super) fn place(
     match displaced.binary_search_by_key(&v, |d| d.0) {
         Ok(k) => displaced.get(k).map(|d| d.1),
         Err(_) => own(v),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aif::{MeshInput, Semantic};
+    use crate::meshes::{GenerateOptions, generate};
+    use crate::pipeline::{Job, build_progressive};
+    use crate::refine::hierarchy::Options;
+    use crate::refine::selective::{Cull, Limits};
+    use crate::selective::{SelectiveScene, circle};
+
+    /// The normals of a mesh's corners.
+    fn normals(mesh: &MeshInput) -> Vec<&[f32]> {
+        let wedges = mesh.wedges.as_ref().unwrap();
+        let k = wedges.channel(&Semantic::Normal).unwrap();
+        wedges.corner.iter().map(|&w| wedges.get(w, k).unwrap()).collect()
+    }
+
+    #[test]
+    fn a_scene_on_its_way_has_normals_that_are_so_too() {
+        let sample = generate("torus", &GenerateOptions::default().with_faces(2000)).unwrap();
+        let scene = crate::samples::scene(sample, "torus");
+        let scene = build_progressive(scene, &Job::default(), &crate::simplify::Quiet).unwrap().scene;
+        let mut scene = SelectiveScene::new(scene, &Options::default()).unwrap();
+        let camera = circle(scene.bounds().unwrap(), 2).unwrap().swap_remove(0);
+        for morph in [Geomorph::Time { frames: 4 }, Geomorph::Error { band: 3.0 }] {
+            scene.reset();
+            scene.set_geomorph(Some(morph));
+            // How many corners are not drawn with their own.
+            let mut at = |tau: f64| {
+                scene.adapt(&camera, tau, Cull::All, &Limits::default()).unwrap();
+                let (drawn, own) = (scene.to_scene(), scene.shown(0).to_input());
+                let (drawn, own) = (normals(&drawn.meshes[0].geometry), normals(&own));
+                assert!(drawn.iter().all(|n| (n.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-3));
+                assert_eq!(drawn.len(), own.len());
+                drawn.iter().zip(&own).filter(|n| n.0 != n.1).count()
+            };
+            at(20.0);
+            assert!(at(1.0) > 100, "{morph:?}");
+            if let Geomorph::Time { .. } = morph {
+                let left = [0; 4].map(|_| at(1.0));
+                assert_eq!(left[3], 0, "{left:?}");
+            }
+        }
     }
 }

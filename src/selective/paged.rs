@@ -35,6 +35,10 @@ impl ByteRanges for Ranges {
         self.0.read_at(range.start, &mut out)?;
         Ok(out)
     }
+
+    fn shared(&self) -> Option<Arc<dyn ByteRanges + Send + Sync>> {
+        Some(Arc::new(self.clone()))
+    }
 }
 
 /// A scene cannot be refined out of core.

@@ -41,36 +41,47 @@ pub trait Recordable {
     fn changed_vertices(&self, m: usize, changes: &Self::Changes) -> Option<Vec<u32>>;
 }
 
+/// What both scenes say themselves, by the same names.
+macro_rules! as_the_scene_says {
+    () => {
+        fn meshes(&self) -> usize {
+            self.views().len()
+        }
+
+        fn placements(&self) -> &[Vec<DMat4>] {
+            self.placements()
+        }
+
+        fn full_faces(&self) -> usize {
+            self.full_faces()
+        }
+
+        fn face_count(&self) -> usize {
+            self.face_count()
+        }
+
+        fn vertex_count(&self) -> usize {
+            self.vertex_count()
+        }
+
+        fn morphing(&self) -> usize {
+            self.morphing()
+        }
+
+        fn bounds(&self) -> Option<(DVec3, DVec3)> {
+            self.bounds()
+        }
+
+        fn displaced(&self, m: usize) -> &[(u32, DVec3)] {
+            self.displaced(m)
+        }
+    };
+}
+
 impl Recordable for SelectiveScene {
     type Changes = Changes;
 
-    fn meshes(&self) -> usize {
-        self.views().len()
-    }
-
-    fn placements(&self) -> &[Vec<DMat4>] {
-        self.placements()
-    }
-
-    fn full_faces(&self) -> usize {
-        self.full_faces()
-    }
-
-    fn face_count(&self) -> usize {
-        self.face_count()
-    }
-
-    fn vertex_count(&self) -> usize {
-        self.vertex_count()
-    }
-
-    fn morphing(&self) -> usize {
-        self.morphing()
-    }
-
-    fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        self.bounds()
-    }
+    as_the_scene_says!();
 
     fn origin(&self, m: usize) -> DVec3 {
         self.views()[m].hierarchy().extent().0
@@ -91,10 +102,6 @@ impl Recordable for SelectiveScene {
         there.then(|| morph::place(self.displaced(m), v, |v| view.position(v))).flatten()
     }
 
-    fn displaced(&self, m: usize) -> &[(u32, DVec3)] {
-        self.displaced(m)
-    }
-
     fn vertices(&self, m: usize) -> Vec<u32> {
         let view = self.shown(m);
         (0..view.hierarchy().mesh().vertices() as u32).filter(|&v| view.position(v).is_some()).collect()
@@ -113,33 +120,7 @@ impl Recordable for SelectiveScene {
 impl Recordable for PagedScene {
     type Changes = PagedChanges;
 
-    fn meshes(&self) -> usize {
-        self.views().len()
-    }
-
-    fn placements(&self) -> &[Vec<DMat4>] {
-        self.placements()
-    }
-
-    fn full_faces(&self) -> usize {
-        self.full_faces()
-    }
-
-    fn face_count(&self) -> usize {
-        self.face_count()
-    }
-
-    fn vertex_count(&self) -> usize {
-        self.vertex_count()
-    }
-
-    fn morphing(&self) -> usize {
-        self.morphing()
-    }
-
-    fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        self.bounds()
-    }
+    as_the_scene_says!();
 
     fn origin(&self, m: usize) -> DVec3 {
         self.views()[m].extent().0
@@ -156,10 +137,6 @@ impl Recordable for PagedScene {
 
     fn place(&self, m: usize, v: u32) -> Option<DVec3> {
         morph::place(self.displaced(m), v, |v| self.views()[m].position(v))
-    }
-
-    fn displaced(&self, m: usize) -> &[(u32, DVec3)] {
-        self.displaced(m)
     }
 
     fn vertices(&self, m: usize) -> Vec<u32> {

@@ -5,7 +5,7 @@ use super::{morph, tolerance};
 use crate::aif::MeshInput;
 use crate::progressive::Leftover;
 use crate::refine::paged::PagedView;
-use crate::refine::selective::{Lens, LensError, View};
+use crate::refine::selective::{Lens, LensError, TimedMorph, View};
 use crate::refine::truly::TrulyView;
 use crate::refine::view::Camera;
 use crate::scene::Scene;
@@ -37,6 +37,17 @@ pub(super) trait Whole: Shown {
 pub(super) struct Drawn<'a> {
     pub(super) view: &'a View,
     pub(super) displaced: &'a [(u32, DVec3)],
+    pub(super) attributes: Attributes<'a>,
+}
+
+/// What attributes a view is drawn with.
+#[derive(Clone, Copy)]
+pub(super) enum Attributes<'a> {
+    Own,
+    /// Those of a morph by time.
+    Timed(&'a TimedMorph),
+    /// Those of a morph by error: its lenses and its band.
+    ByError(&'a [Lens], f64),
 }
 
 impl Drawn<'_> {
@@ -74,11 +85,21 @@ impl Shown for Drawn<'_> {
 
 impl Whole for Drawn<'_> {
     fn to_input(&self) -> MeshInput {
-        self.view.to_input_with(self.displaced)
+        match self.attributes {
+            Attributes::Timed(morph) => morph.to_input(),
+            Attributes::ByError(lenses, band) if !self.displaced.is_empty() => {
+                self.view.to_input_morphed(lenses, band)
+            }
+            _ => self.view.to_input_with(self.displaced),
+        }
     }
 
     fn is_full(&self) -> bool {
-        self.vertices() == self.view.hierarchy().mesh().vertices() && self.displaced.is_empty()
+        let at_rest = match self.attributes {
+            Attributes::Timed(morph) => morph.is_at_rest(),
+            _ => self.displaced.is_empty(),
+        };
+        self.vertices() == self.view.hierarchy().mesh().vertices() && at_rest
     }
 
     fn has_order(&self) -> bool {

@@ -135,8 +135,8 @@ impl Assembly {
             if let Some(part) = part {
                 let pm = &mut part.mesh;
                 pm.splits.reserve(splits as usize);
-                places::reserve(&mut pm.new_positions, splits as usize);
-                places::reserve(&mut pm.moved_positions, moved as usize);
+                places::reserve(pm.new_positions.plain(), splits as usize);
+                places::reserve(pm.moved_positions.plain(), moved as usize);
             }
         }
     }
@@ -242,6 +242,7 @@ impl Assembly {
             let n = pm.splits.len() as u32;
             pm.bounds = part.bounds.filter(|b| b.len() == n as usize).map(Arc::new);
             pm.levels = part.head.levels.iter().copied().filter(|&l| l < n).chain([n]).collect();
+            pm.pack();
             report.quantisation_errors.push(part.head.quantisation_error);
             report.flat_faces.push(part.head.flat_faces);
             report.complete &= n == part.head.splits;

@@ -358,11 +358,12 @@ fn code_base<C: Coder>(c: &mut C, head: &MeshHead, pm: &mut ProgressiveMesh) -> 
                 c.signed(&mut m.wedge, v as i64 - last as i64).wrapping_add(last as i64),
                 head.base_vertices,
             )?;
-            let source = (!C::READS).then(|| (w.present[i], &w.rows[i * w.stride..(i + 1) * w.stride]));
+            let row = if C::READS { Default::default() } else { w.rows.row(i, w.stride) };
+            let source = (!C::READS).then(|| (w.present[i], &*row));
             let present = rows.code(c, NONE, source);
             if C::READS {
                 w.base_vertex.push(last);
-                w.rows.extend_from_slice(rows.row());
+                w.rows.plain().extend_from_slice(rows.row());
                 w.present.push(present);
                 if c.spent() {
                     return None;
@@ -401,8 +402,8 @@ pub(super) fn read(bytes: &[u8], raw: u64) -> Option<(MeshHead, ProgressiveMesh)
     let mut head = MeshHead::read(&mut rest).filter(|h| raw_bytes(h) == raw)?;
     let mut pm = ProgressiveMesh {
         base_positions: places::empty(head.double),
-        new_positions: places::empty(head.double),
-        moved_positions: places::empty(head.double),
+        new_positions: places::empty(head.double).into(),
+        moved_positions: places::empty(head.double).into(),
         wedges: head.channels.as_ref().map(|channels| WedgeStreams {
             channels: channels.clone(),
             stride: head.stride(),

@@ -86,7 +86,7 @@ struct Codec<'a> {
     pass: Vec<u32>,
     at: usize,
     /// Of no meaning: what was looked at ahead.
-    ahead: u8,
+    ahead: u32,
     list: Vec<u32>,
     /// Something was split in this sweep.
     moved: bool,
@@ -147,11 +147,11 @@ impl<'a> Codec<'a> {
         let guess = self.guess(v, &cuts, code.moves());
         let level = source.as_ref().map_or(0, |s| error_level(s.pm.splits.error[s.at.split]) as u16);
         let level = self.level(&mut c[ERRORS], v, level)?;
-        let place = source.as_ref().map_or([0.0; 3], |s| places::point(&s.pm.new_positions, s.at.split));
+        let place = source.as_ref().map_or([0.0; 3], |s| s.pm.new_positions.get(s.at.split).to_array());
         let place = self.residuals.code(&mut c[PLACES], code.moves() as usize, (&guess, level), place);
         let mut moved = None;
         if code.moves() {
-            let to = source.as_ref().map_or([0.0; 3], |s| places::point(&s.pm.moved_positions, s.at.moved));
+            let to = source.as_ref().map_or([0.0; 3], |s| s.pm.moved_positions.get(s.at.moved).to_array());
             let guess = self.guess_moved(v, &cuts, &guess);
             moved = Some(self.residuals.code(&mut c[PLACES], 2, (&guess, level), to));
         }
@@ -181,7 +181,7 @@ impl<'a> Codec<'a> {
     #[inline]
     fn apply(&mut self, v: u32, cuts: &Cuts, code: SplitCode, made: ([f64; 3], u16)) {
         let u = self.walk.vertices.len();
-        self.walk.split(v, &self.ring, (cuts.first, cuts.count), code, made);
+        self.walk.split(v, &self.ring, (cuts.first, cuts.count), [cuts.left, cuts.right], code, made);
         self.walk.vertices[u].visit = NEW;
         self.list.extend([v, u as u32]);
     }

@@ -173,9 +173,9 @@ impl Extras {
             let row = source.as_ref().and_then(|s| {
                 let w = s.pm.wedges.as_ref()?;
                 let r = s.at.row + k;
-                Some((w.present[r], &w.rows[r * w.stride..(r + 1) * w.stride]))
+                Some((w.present[r], w.rows.row(r, w.stride)))
             });
-            let present = rows.code(c, vertex, row);
+            let present = rows.code(c, vertex, row.as_ref().map(|(present, row)| (*present, &**row)));
             if C::READS {
                 out.rows.extend_from_slice(rows.row());
                 out.present.push(present);

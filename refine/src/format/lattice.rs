@@ -1,8 +1,8 @@
 //! Which lattices the positions of a mesh lie on, and putting them on one.
 
-use super::places::{self, Lattice};
+use super::places::Lattice;
 use crate::aif::Positions;
-use crate::progressive::ProgressiveMesh;
+use crate::progressive::{Places, ProgressiveMesh};
 use glam::DVec3;
 
 /// Places looked at to find lattices.
@@ -32,9 +32,9 @@ pub(super) fn find(pm: &ProgressiveMesh) -> Vec<Lattice> {
     found
 }
 
-fn sample(p: &Positions) -> impl Iterator<Item = [f64; 3]> + '_ {
+fn sample(p: &Places) -> impl Iterator<Item = [f64; 3]> + '_ {
     let step = p.len().div_ceil(SAMPLES).max(1);
-    (0..p.len()).step_by(step).map(|i| places::point(p, i))
+    (0..p.len()).step_by(step).map(|i| p.get(i).to_array())
 }
 
 /// Places that are multiples of a cell in every coordinate, where other places may be anywhere: the cell that spares most bits.
@@ -65,7 +65,7 @@ fn find_binary(pm: &ProgressiveMesh) -> Option<Lattice> {
 }
 
 /// Most coordinates have few decimals.
-fn find_decimal(p: &Positions) -> Option<Lattice> {
+fn find_decimal(p: &Places) -> Option<Lattice> {
     let largest = sample(p).flatten().map(f64::abs).fold(0.0, f64::max);
     let round = |x: f64| if p.is_f64() { x } else { x as f32 as f64 };
     let share = |l: &Lattice| {
@@ -94,8 +94,9 @@ fn find_decimal(p: &Positions) -> Option<Lattice> {
 
 /// Moves all places onto a grid of `2^bits` cells along the longest side of their box; returns the grid, and how far a place moved at most.
 pub(super) fn quantise(pm: &mut ProgressiveMesh, bits: u32) -> Option<(Lattice, f64)> {
-    let bounds =
-        [&pm.base_positions, &pm.new_positions, &pm.moved_positions].into_iter().filter_map(|p| p.bounds());
+    let [new, moved] = [pm.new_positions.plain(), pm.moved_positions.plain()];
+    let mut all = [&mut pm.base_positions, new, moved];
+    let bounds = all.iter().filter_map(|p| p.bounds());
     let (low, high) = bounds.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
     let side = (high - low).max_element();
     let cells = (1u64 << bits) as f64;
@@ -103,7 +104,7 @@ pub(super) fn quantise(pm: &mut ProgressiveMesh, bits: u32) -> Option<(Lattice, 
     let step = if side > 0.0 { side / cells } else { 1.0 };
     let grid = Some(Lattice { origin: low.to_array(), step, parts: 1.0 }).filter(Lattice::is_sound)?;
     let mut error = 0.0f64;
-    for p in [&mut pm.base_positions, &mut pm.new_positions, &mut pm.moved_positions] {
+    for p in &mut all {
         for i in 0..p.len() {
             let x = p.get(i).to_array();
             let to = DVec3::from_array(std::array::from_fn(|k| grid.at(k, grid.nearest(k, x[k]))));

@@ -282,7 +282,7 @@ pub(crate) fn read_base(head: &MeshHead, raw: u64, bytes: &[u8]) -> Option<BaseL
     for (x, b) in x.iter_mut().zip(numbers.chunks_exact(8)) {
         *x = f64::from_le_bytes(b.try_into().ok()?);
     }
-    if raw != raw_bytes_of_base(head) || x.iter().any(|x| !x.is_finite()) {
+    if raw != raw_bytes_of_base(head) || x.iter().any(|x| !x.is_finite()) || x[3] < 0.0 {
         return None;
     }
     let mut links =

@@ -101,28 +101,40 @@ pub(super) struct Plan {
     pub(super) levels: Vec<u32>,
 }
 
-/// The forest of splits: after split `i` the next at its vertex is `again[i]`, the first at the vertex it makes `first[i]`.
-struct Forest {
-    on: Vec<[u32; 3]>,
-    again: Vec<u32>,
-    first: Vec<u32>,
+/// What a plan looks at of a split, side by side: splits come in the order of their errors, so each is somewhere else in memory.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+struct Node {
+    /// Splits it depends on.
+    on: [u32; 3],
+    /// The next at its vertex, and the first at the vertex it makes.
+    again: u32,
+    first: u32,
+    /// Its chunk, once it is in one.
+    chunk: u32,
+    /// In the order of descent: its vertex, and that of the start of its band which it descends from.
+    vertex: u32,
+    root: u32,
 }
 
-impl Forest {
-    fn new(pm: &ProgressiveMesh) -> Self {
-        let on = pm.dependencies();
-        let n = on.len();
-        let mut f = Forest { on, again: vec![NONE; n], first: vec![NONE; n] };
-        for i in 0..n {
-            let before = f.on[i][0];
-            if before != NONE {
-                let same = pm.splits.vertex[before as usize] == pm.splits.vertex[i];
-                let of = if same { &mut f.again } else { &mut f.first };
-                of[before as usize] = i as u32;
-            }
+/// The forest of splits.
+fn forest(pm: &ProgressiveMesh, rank: &[u32], roots: &[u32]) -> Vec<Node> {
+    let n0 = pm.base_vertices();
+    let of = |((on, &v), &root): (([u32; 3], &u32), &u32)| {
+        let (vertex, root) = (rank[v as usize], rank[root as usize]);
+        Node { on, again: NONE, first: NONE, chunk: NONE, vertex, root }
+    };
+    let on = pm.dependencies().into_iter();
+    let mut nodes: Vec<Node> = on.zip(&pm.splits.vertex).zip(&roots[n0..]).map(of).collect();
+    for (i, &v) in (0u32..).zip(&pm.splits.vertex) {
+        let before = nodes[i as usize].on[0];
+        if let Some(node) = nodes.get_mut(before as usize) {
+            // The one before is at the same vertex, or made it.
+            let to = if v as usize == n0 + before as usize { &mut node.first } else { &mut node.again };
+            *to = i;
         }
-        f
     }
+    nodes
 }
 
 impl Plan {
@@ -136,7 +148,6 @@ impl Plan {
         let base = base_order(pm);
         let rank = ranks(pm, &base);
         let bands = bands(pm, &rank, layout);
-        let forest = Forest::new(pm);
         // The vertex at the start of the band that each split descends from.
         let mut root = vec![NONE; pm.vertices()];
         for i in 0..n {
@@ -146,25 +157,20 @@ impl Plan {
             root[n0 + i] = r;
         }
         // By band, in each by the vertex they descend from.
-        let root_of = |i: u32| rank[root[n0 + i as usize] as usize];
+        let nodes = forest(pm, &rank, &root);
         let all: Vec<u32> = (0..n as u32).collect();
         let last = bands.iter().max().map_or(0, |&b| b as usize + 1);
-        let keys = sorted(&sorted(&all, pm.vertices(), |i| root_of(i) as usize), last, |i| {
+        let keys = sorted(&sorted(&all, pm.vertices(), |i| nodes[i as usize].root as usize), last, |i| {
             bands[i as usize] as usize
         });
-        let mut schedule = Schedule {
-            pm,
-            forest,
-            chunk: vec![u32::MAX; n],
-            slot: (0..n0 as u32).chain(std::iter::repeat_n(NONE, n)).collect(),
-            order: Vec::with_capacity(n),
-            rank: &rank,
-        };
+        let mut schedule = Schedule { nodes, done: vec![false; n], order: Vec::with_capacity(n) };
         let mut plan = Plan::default();
         for band in keys.chunk_by(|&a, &b| bands[a as usize] == bands[b as usize]) {
             let name = bands[band[0] as usize];
             let mut left = band.iter().filter(|&&i| !schedule.has(i)).count();
-            let (mut subtrees, mut subtree) = (band.chunk_by(|&a, &b| root_of(a) == root_of(b)), 0);
+            let subtrees: Vec<&[u32]> =
+                band.chunk_by(|&a, &b| schedule.root(a) == schedule.root(b)).collect();
+            let (mut subtrees, mut subtree) = (subtrees.into_iter(), 0);
             while left > 0 {
                 let number = plan.pieces.len() as u32;
                 let aim = left.div_ceil(left.div_ceil(layout.chunk));
@@ -349,22 +355,22 @@ pub(super) fn labels(base: &[u32]) -> Vec<Label> {
 }
 
 /// Makes the order, chunk by chunk.
-struct Schedule<'a> {
-    pm: &'a ProgressiveMesh,
-    forest: Forest,
-    /// The chunk of a split, once it is in one.
-    chunk: Vec<u32>,
-    /// Number in the file of a vertex, once it has one.
-    slot: Vec<u32>,
+struct Schedule {
+    nodes: Vec<Node>,
+    /// The splits that are in the order.
+    done: Vec<bool>,
     order: Vec<u32>,
-    /// The place of each vertex in the order of descent.
-    rank: &'a [u32],
 }
 
-impl Schedule<'_> {
+impl Schedule {
     /// True if split `i` is in a chunk.
     fn has(&self, i: u32) -> bool {
-        self.chunk[i as usize] != u32::MAX
+        self.nodes[i as usize].chunk != NONE
+    }
+
+    /// The vertex of the start of its band that split `i` descends from.
+    fn root(&self, i: u32) -> u32 {
+        self.nodes[i as usize].root
     }
 
     /// Puts a split, and all it depends on that is in no chunk yet, into chunk `number`.
@@ -373,13 +379,13 @@ impl Schedule<'_> {
         if self.has(i) {
             return;
         }
-        self.chunk[i as usize] = number;
+        self.nodes[i as usize].chunk = number;
         taken.push(i);
         while let Some(&i) = taken.get(at) {
             at += 1;
-            for d in self.forest.on[i as usize] {
-                if d != NONE && !self.has(d) {
-                    self.chunk[d as usize] = number;
+            for d in self.nodes[i as usize].on {
+                if let Some(node) = self.nodes.get_mut(d as usize).filter(|node| node.chunk == NONE) {
+                    node.chunk = number;
                     taken.push(d);
                 }
             }
@@ -388,12 +394,12 @@ impl Schedule<'_> {
 
     /// Appends the splits of chunk `number`.
     fn add(&mut self, taken: &[u32], number: u32) {
-        let n0 = self.pm.base_vertices();
+        let here = |nodes: &[Node], i: u32| nodes.get(i as usize).is_some_and(|node| node.chunk == number);
         let mut roots: Vec<(u32, u32)> = Vec::new();
         for &i in taken {
-            let before = self.forest.on[i as usize][0];
-            if before == NONE || self.chunk[before as usize] != number {
-                roots.push((self.rank[self.pm.splits.vertex[i as usize] as usize], i));
+            let node = &self.nodes[i as usize];
+            if !here(&self.nodes, node.on[0]) {
+                roots.push((node.vertex, i));
             }
         }
         roots.sort_unstable();
@@ -406,18 +412,15 @@ impl Schedule<'_> {
             pass.reverse();
             // Both vertices of a split come again in the next sweep, so that the mesh is similarly fine everywhere: 0.7 bits a vertex on bunny and horse.
             while let Some(i) = pass.pop() {
-                let ready = |d: u32| {
-                    d == NONE || self.chunk[d as usize] != number || self.slot[n0 + d as usize] != NONE
-                };
-                if !self.forest.on[i as usize].into_iter().all(ready) {
+                let node = self.nodes[i as usize];
+                // What is in chunks before this one has been done.
+                if node.on.into_iter().any(|d| here(&self.nodes, d) && !self.done[d as usize]) {
                     list.push(i);
                     continue;
                 }
-                self.slot[n0 + i as usize] = (n0 + self.order.len()) as u32;
+                self.done[i as usize] = true;
                 self.order.push(i);
-                let here = |s: &u32| *s != NONE && self.chunk[*s as usize] == number;
-                list.extend(Some(self.forest.again[i as usize]).filter(here));
-                list.extend(Some(self.forest.first[i as usize]).filter(here));
+                list.extend([node.again, node.first].into_iter().filter(|&i| here(&self.nodes, i)));
             }
         }
     }

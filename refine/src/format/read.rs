@@ -250,6 +250,11 @@ pub trait ByteRanges {
     ///
     /// Errors: the source's.
     fn fetch(&self, range: Range<u64>) -> std::io::Result<Vec<u8>>;
+
+    /// The same bytes for other threads, which then may be asked for ahead of need; `None`: only where they are needed.
+    fn shared(&self) -> Option<std::sync::Arc<dyn ByteRanges + Send + Sync>> {
+        None
+    }
 }
 
 impl ByteRanges for [u8] {
@@ -263,6 +268,10 @@ impl ByteRanges for [u8] {
 impl<T: ByteRanges + ?Sized> ByteRanges for &T {
     fn fetch(&self, range: Range<u64>) -> std::io::Result<Vec<u8>> {
         (**self).fetch(range)
+    }
+
+    fn shared(&self) -> Option<std::sync::Arc<dyn ByteRanges + Send + Sync>> {
+        (**self).shared()
     }
 }
 

@@ -79,10 +79,10 @@ impl SplitBlock {
         to.right.extend_from_slice(&from.right);
         to.code.extend_from_slice(&from.code);
         to.error.extend_from_slice(&from.error);
-        append(&mut pm.new_positions, &self.new_positions);
-        append(&mut pm.moved_positions, &self.moved_positions);
+        append(pm.new_positions.plain(), &self.new_positions);
+        append(pm.moved_positions.plain(), &self.moved_positions);
         if let Some(w) = &mut pm.wedges {
-            w.rows.extend_from_slice(&self.rows);
+            w.rows.plain().extend_from_slice(&self.rows);
             w.present.extend(self.present.iter().copied());
             w.explicit.extend_from_slice(&self.explicit);
         }

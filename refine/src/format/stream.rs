@@ -47,7 +47,7 @@ impl Tree {
         if !plain || !base.splits.vertex.is_empty() || like.is_f64() != base.base_positions.is_f64() {
             return None;
         }
-        let probe = ProgressiveMesh { new_positions: like.clone(), ..ProgressiveMesh::default() };
+        let probe = ProgressiveMesh { new_positions: like.clone().into(), ..ProgressiveMesh::default() };
         let n0 = base.base_vertices() as u32;
         let mut levels = vec![0, splits];
         levels.dedup();

@@ -18,8 +18,9 @@ const NEAR: [u8; 8] = [1, 0, 2, 1, 0, 2, 0, 0];
 const FAR: [u8; 8] = [0, 1, 1, 2, 2, 0, 0, 0];
 /// Where in the face the link of the half stands.
 const LINK: [u8; 8] = [3, 3, 4, 4, 5, 5, 5, 5];
-/// The same of the face's other edge at the vertex, 4 bits each: a ring waits for one such step after the other, and this takes less time than a table.
-const EXITS: u32 = 0x43_3554;
+/// By the low bits of a half, 8 bits each: in the low four where in the face the vertex at the other end stands, above where the link of the face's other edge at the vertex does. A ring waits for one
+/// such step after the other, and this takes less time than tables.
+const STEPS: u64 = 0x4032_3251_5140;
 
 /// The face's other edge at the vertex; [`NONE`] of [`NONE`].
 #[inline(always)]
@@ -198,7 +199,7 @@ fn seen_from(origin: &[f64; 3], p: [f64; 3]) -> [f32; 3] {
 }
 
 /// Adds to a list of those of `most` that have changed; what is in it again goes before it doubles that.
-#[inline]
+#[cold]
 fn note(changed: &mut Vec<u32>, which: u32, most: usize) {
     if changed.len() >= 2 * most + 64 {
         changed.sort_unstable();
@@ -317,14 +318,14 @@ impl Walk {
     }
 
     /// Notes that vertex `v` is about to change.
-    #[inline]
+    #[inline(always)]
     pub(super) fn changes(&mut self, v: u32) {
         if (v as usize) < self.base.1 {
             note(&mut self.changed.1, v, self.base.1);
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn face_mut(&mut self, f: u32) -> &mut Face {
         if (f as usize) < self.base.0 {
             note(&mut self.changed.0, f, self.base.0);
@@ -352,6 +353,13 @@ impl Walk {
         (cut & 3 < 3 && face[NEAR[(h & 7) as usize] as usize] == v).then_some(h)
     }
 
+    /// Something of the face with which the ring of `v` begins, so that it is at hand when that is asked for.
+    #[inline(always)]
+    pub(super) fn ask(&self, v: u32) -> u32 {
+        let start = self.starts.get(v as usize).map_or(NONE, |s| s[0]);
+        self.faces.get((start >> 3) as usize).map_or(0, |f| f[0])
+    }
+
     /// Where the ring of `v` begins; [`NONE`] if it has no faces.
     #[inline]
     pub(super) fn start(&self, v: u32) -> u32 {
@@ -370,35 +378,37 @@ impl Walk {
     #[inline]
     pub(super) fn ring(&self, v: u32, start: u32, ring: &mut Ring) -> Option<()> {
         let t = self.vertices[v as usize].place;
-        let (faces, mut entry, mut n, mut squares) = (&self.faces[..], start, 0, 0.0);
-        let exit = loop {
-            let face = &faces[(entry >> 3) as usize];
-            let low = (entry & 7) as usize;
-            let edge = self.edge(entry, face[FAR[low] as usize & 3], &t);
-            squares += edge.to[3];
-            match ring.room.get_mut(n) {
-                Some(room) => *room = edge,
-                None if n > self.faces.len().min(ring.most) => return None,
-                None => ring.room.resize(2 * n, edge),
-            }
-            n += 1;
-            let link = face[(EXITS >> (4 * low) & 7) as usize];
-            if link == NONE {
-                break turn(entry);
-            }
-            // The other edge is seen the other way.
-            entry = link ^ !entry & 1;
-            if entry == start {
-                let first = ring.room[0];
-                match ring.room.get_mut(n) {
-                    Some(room) => *room = first,
-                    None => ring.room.push(first),
+        let faces = &self.faces[..];
+        loop {
+            let (mut entry, mut squares) = (start, 0.0);
+            for (n, room) in ring.room.iter_mut().enumerate() {
+                let face = &faces[(entry >> 3) as usize];
+                let step = (STEPS >> (8 * (entry & 7))) as usize;
+                *room = self.edge(entry, face[step & 3], &t);
+                squares += room.to[3];
+                let link = face[step >> 4 & 7];
+                if link == NONE {
+                    return self.open(start, (turn(entry), n + 1), &t, ring);
                 }
-                (ring.closed, ring.edges, ring.squares) = (true, n, squares);
-                return Some(());
+                // The other edge is seen the other way.
+                entry = link ^ !entry & 1;
+                if entry == start {
+                    let first = ring.room[0];
+                    match ring.room.get_mut(n + 1) {
+                        Some(room) => *room = first,
+                        None => ring.room.push(first),
+                    }
+                    (ring.closed, ring.edges, ring.squares) = (true, n + 1, squares);
+                    return Some(());
+                }
             }
-        };
-        self.open(start, (exit, n), &t, ring)
+            // Once more, with room for twice as many.
+            let room = ring.room.len();
+            if room > faces.len().min(ring.most) {
+                return None;
+            }
+            ring.room.resize(2 * room.max(ROOM), Edge::NOWHERE);
+        }
     }
 
     /// The ring goes no further than `exit`, behind `n` edges: the last edge, and those before the first.
@@ -425,23 +435,24 @@ impl Walk {
         ring.squares = 0.0;
         room.iter().for_each(|e| ring.squares += e.to[3]);
         (ring.closed, ring.edges) = (false, room.len());
-        room.push(Edge::NOWHERE);
+        // With the room that others have found there.
+        room.resize((room.len() + 1).max(ROOM), Edge::NOWHERE);
         Some(())
     }
 
-    /// Does a split of `v`: the `count` faces behind edge `first` of its ring go to the new vertex, which is at `place`. Returns the tips.
+    /// Does a split of `v`: the `count` faces behind edge `first` of its ring go to the new vertex, which is at `place`; both cuts as the ring has them.
     #[inline]
     pub(super) fn split(
         &mut self,
         v: u32,
         ring: &Ring,
         (first, count): (usize, usize),
+        [left, right]: [Cut; 2],
         code: SplitCode,
         (place, level): ([f64; 3], u16),
-    ) -> [u32; 2] {
+    ) {
         let u = self.vertices.len() as u32;
         let two = code.two_faces();
-        let (left, right) = (ring.left(first), ring.right(first, count));
         let tips = [ring.far(first), if two { ring.far(first + count) } else { NONE }];
         let mut k = first;
         for _ in 0..count {
@@ -452,12 +463,13 @@ impl Walk {
             self.face_mut(entry >> 3)[NEAR[(entry & 7) as usize] as usize & 3] = u;
             k = ring.around(k + 1);
         }
-        let (l, old, mut at_u) = self.insert(code.left().1, [v, u, tips[0]], left);
+        // Both faces are across the edge between old and new vertex.
+        let ends = [code.left().1, code.right().1];
+        let [l, r] = [0, 1].map(|k| (self.faces.len() as u32 + k) << 3 | 1 << 1 | !ends[k as usize] as u32);
+        let between = if two { r ^ l & 1 } else { NONE };
+        let (old, mut at_u) = self.insert(ends[0], [v, u, tips[0]], left, between);
         if two {
-            let (r, _, new) = self.insert(code.right().1, [v, u, tips[1]], right);
-            self.link(l, r);
-            self.link(r, l);
-            at_u = new;
+            at_u = self.insert(ends[1], [v, u, tips[1]], right, l ^ r & 1).1;
         } else {
             // At the border, by the edge between both.
             at_u = turn(at_u);
@@ -484,13 +496,12 @@ impl Walk {
                 t.visit |= TOUCHED;
             }
         }
-        tips
     }
 
-    /// Appends a face (tip first) into an opening; returns its edge between old and new vertex, that between the tip and the old one, both seen from
-    /// the old, and that between the tip and the new one, seen from that.
-    #[inline]
-    fn insert(&mut self, new_next: bool, [v, u, tip]: [u32; 3], at: Cut) -> (u32, u32, u32) {
+    /// Appends a face (tip first) into an opening, with the link of its edge between old and new vertex; returns that between the tip and the old one, seen from the old, and that between the tip and
+    /// the new one, seen from that.
+    #[inline(always)]
+    fn insert(&mut self, new_next: bool, [v, u, tip]: [u32; 3], at: Cut, between: u32) -> (u32, u32) {
         let face = self.faces.len() as u32;
         let (b, c) = if new_next { (u, v) } else { (v, u) };
         // Edge 0 ends at corner 1, edge 2 begins at corner 2.
@@ -499,18 +510,18 @@ impl Walk {
         let (to_after, to_before) = if new_next { (at.inner, at.outer) } else { (at.outer, at.inner) };
         // Seen from where the face ends the edge.
         let link = |to: u32, from: u32| if to == NONE { NONE } else { to ^ from & 1 };
-        self.faces.push([tip, b, c, link(to_after, after), NONE, link(to_before, before)]);
+        self.faces.push([tip, b, c, link(to_after, after), between, link(to_before, before)]);
         if at.outer != NONE {
             self.link(at.outer, old);
         }
         if at.inner != NONE {
             self.link(at.inner, new);
         }
-        (face << 3 | 1 << 1 | !new_next as u32, old, new)
+        (old, new)
     }
 
     /// Links half `x` to `y`, both seen from the same vertex.
-    #[inline]
+    #[inline(always)]
     fn link(&mut self, x: u32, y: u32) {
         self.face_mut(x >> 3)[LINK[x as usize & 7] as usize] = y ^ x & 1;
     }
@@ -529,7 +540,8 @@ mod tests {
             let low = (pack(h) & 7) as usize;
             assert_eq!(turn(pack(h)), pack(h.turn()));
             assert_eq!(NEAR[low] as usize, h.corner());
-            assert_eq!((EXITS >> (4 * low) & 7) as usize, LINK[(turn(pack(h)) & 7) as usize] as usize);
+            assert_eq!((STEPS >> (8 * low) >> 4 & 7) as usize, LINK[(turn(pack(h)) & 7) as usize] as usize);
+            assert_eq!((STEPS >> (8 * low) & 3) as usize, h.far_corner());
             assert_eq!(FAR[low] as usize, h.far_corner());
             assert_eq!(cut(pack(h)), h.code());
             for starts in [false, true] {

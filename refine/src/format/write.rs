@@ -7,7 +7,6 @@ use super::container::{Chunk, ChunkType, Directory, EXPANSION};
 use super::input_order;
 use super::lattice;
 use super::pages;
-use super::places;
 use super::plan::{Layout, Piece, Plan};
 use super::splits::{self, Counts};
 use crate::hierarchy::{Bounds, Guarantee, Tree};
@@ -99,6 +98,11 @@ pub enum EncodeError {
         "mesh {0}: it has no bounds by the rule of cuts, which refining out of core takes; measure them first"
     )]
     NoBounds(usize),
+    /// Bounds of a mesh whose extent no number holds.
+    #[error(
+        "mesh {0}: it is larger than double precision can measure, so it has no bounds: scale it down, or leave the bounds out"
+    )]
+    Extent(usize),
     /// Quantisation by other than 2 to 30 bits.
     #[error("quantising to {0} bits: 2 to 30 are possible")]
     Bits(u32),
@@ -156,8 +160,19 @@ pub fn encode(
     let mut orders = Vec::new();
     for (m, pm) in meshes.iter().enumerate() {
         pm.cursor().map_err(|damage| EncodeError::Damage { mesh: m, damage })?;
+        // Those of a hierarchy are left out.
+        let (len, want) = (pm.splits.error.len(), pm.splits.len());
+        if len != want {
+            return Err(EncodeError::Damage {
+                mesh: m,
+                damage: Damage::Length { what: "errors", len, want },
+            });
+        }
         if pm.bounds.as_ref().is_some_and(|b| b.len() != pm.splits.len()) {
             return Err(EncodeError::Inconsistent(m));
+        }
+        if pm.bounds.as_ref().is_some_and(|b| !b.extent().1.is_finite()) {
+            return Err(EncodeError::Extent(m));
         }
         let settled = |b: &Arc<Bounds>| b.guarantee() == Guarantee::Settled;
         if options.pages && !options.sequential && pm.bounds.as_ref().is_none_or(settled) {
@@ -375,11 +390,11 @@ pub(super) fn bounds_beside(splits: &Part, bounds: &Bounds, range: std::ops::Ran
 
 /// Where the vertices that splits make are at full detail.
 fn last_places(pm: &ProgressiveMesh) -> Vec<[f64; 3]> {
-    let mut places: Vec<_> = (0..pm.splits.len()).map(|i| places::point(&pm.new_positions, i)).collect();
+    let mut places: Vec<_> = (0..pm.splits.len()).map(|i| pm.new_positions.get(i).to_array()).collect();
     let moving = pm.splits.code.iter().zip(&pm.splits.vertex).filter(|(c, _)| c.moves());
     for ((_, &v), k) in moving.zip(0..) {
         if let Some(p) = (v as usize).checked_sub(pm.base_vertices()).and_then(|i| places.get_mut(i)) {
-            *p = places::point(&pm.moved_positions, k);
+            *p = pm.moved_positions.get(k).to_array();
         }
     }
     places

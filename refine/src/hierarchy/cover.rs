@@ -7,6 +7,10 @@
 //! **Why this holds for all views.** By the ring rule the patch that a collapse replaces, the one that comes, and what has happened to them before are the same in every mesh of the hierarchy. So a point takes the same way from face to face, only
 //! how far it goes depends on the mesh; and the face that it was put on last is, in that mesh, as it was then. The pieces may overlap: of a point that lies in several, each goes a way for which this is true.
 //!
+//! **Who answers.** A split that is undone, but need not be for a view, is there fine enough, or out of view: and with it all that lies in its sphere and is no farther than its error. If split `i` moved a point and split `j` did before, `j` needs `i`: so where `i` is
+//! undone `j` is, too, and answers for the point as long as that is no farther than the error of `j`. The error, the sphere and the cone of `i` are those of the other pieces only. So a place that stays as far as it was makes no sphere larger.
+//! (Which way it deviates may change: so not where directions are looked for.)
+//!
 //! **Rounding.** Pieces are cut in the plane of their face, by weights of its corners, in f64: what is lost or added at a cut is some 1e-16 of the face's size. Errors are raised by [`SLACK`] of the diagonal.
 
 mod cut;
@@ -49,10 +53,12 @@ struct Piece {
     face: u32,
     next: u32,
     len: u8,
+    /// As of [`Walk::known`].
+    known: f64,
     at: [[f64; 2]; CORNERS],
 }
 
-/// A corner of a piece, how far it is from the ring that comes, and which of its faces is nearest or about so.
+/// A corner of a piece, which face of the ring that comes is nearest to it or about so, and how far it is from that.
 #[derive(Clone, Copy)]
 struct Corner {
     at: [f64; 2],
@@ -68,6 +74,14 @@ impl Corner {
         let (a, b) = (self.at, other.at);
         [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t]
     }
+}
+
+/// Where the corners of a piece that was taken up end.
+#[derive(Clone, Copy)]
+struct End {
+    face: u32,
+    end: u32,
+    known: f64,
 }
 
 /// Pieces to be put, and lists of corners to be used again.
@@ -112,6 +126,8 @@ struct Walk<'a> {
     next: Vec<u32>,
     /// Pieces that there are of every face; 0 if it is whole.
     parts: Vec<u32>,
+    /// Of a whole face the largest error of a split that has been undone and answers for it.
+    known: Vec<f64>,
     pieces: Vec<Piece>,
     free: u32,
     near: Vec<Near>,
@@ -128,7 +144,10 @@ struct Scratch {
     hull: Vec<[f64; 2]>,
     /// Corners of pieces, one after the other; and the face of each piece, and where its corners end.
     corners: Vec<Corner>,
-    ends: Vec<(u32, u32)>,
+    ends: Vec<End>,
+    /// Whole faces, and pieces, that this split answers for from now on.
+    faces: Vec<u32>,
+    pieces: Vec<u32>,
     pile: Pile,
     fan: Vec<[u32; 3]>,
     between: Vec<Between>,
@@ -147,6 +166,9 @@ struct Ring<'a> {
     error: f64,
     extent: &'a mut Extent,
     ways: Option<&'a mut Vec<DVec3>>,
+    /// As in [`Scratch`].
+    faces: &'a mut Vec<u32>,
+    pieces: &'a mut Vec<u32>,
 }
 
 impl Ring<'_> {
@@ -204,6 +226,7 @@ impl<'a> Walk<'a> {
             first: corners.iter().enumerate().map(full).collect(),
             next: vec![NONE; corners.len()],
             parts: vec![0; corners.len()],
+            known: vec![0.0; corners.len()],
             pieces: Vec::new(),
             free: NONE,
             near: vec![Near { split: NONE, on: 0, d: 0.0 }; positions.len()],
@@ -269,7 +292,11 @@ impl<'a> Walk<'a> {
             error: 0.0,
             extent,
             ways: body.is_some().then_some(&mut s.ways),
+            faces: &mut s.faces,
+            pieces: &mut s.pieces,
         };
+        ring.faces.clear();
+        ring.pieces.clear();
         for &face in &s.whole {
             let corners = self.finest.corners[face as usize];
             let corner = |k: usize| {
@@ -278,20 +305,21 @@ impl<'a> Walk<'a> {
                 Corner { at: WHOLE[k], p: self.finest.positions[v], d, on: on as usize }
             };
             let piece = [corner(0), corner(1), corner(2)];
-            let (error, on) = best(&piece, &triangles);
+            let (error, on) = best(&piece, &triangles, false);
+            let known = self.known[face as usize];
             if ring.fits(error, &piece) {
-                self.store(face, &piece, (error, on), false, &mut ring);
+                self.store((face, known), &piece, (error, on), false, &mut ring);
                 continue;
             }
             let mut whole = s.pile.fresh();
             whole.extend_from_slice(&piece);
             s.pile.stack.push(whole);
-            self.put(face, &mut ring, &mut s.pile);
+            self.put((face, known), &mut ring, &mut s.pile);
         }
         let mut from = 0;
-        for group in s.ends.chunk_by(|a, b| a.0 == b.0) {
-            let face = group[0].0;
-            let to = group[group.len() - 1].1 as usize;
+        for group in s.ends.chunk_by(|a, b| a.face == b.face) {
+            let face = group[0].face;
+            let to = group[group.len() - 1].end as usize;
             let all = &s.corners[from..to];
             if group.len() > 1 {
                 // All of them as one, if that is no farther.
@@ -301,30 +329,35 @@ impl<'a> Walk<'a> {
                 let of = |at: &[f64; 2]| all.iter().find(|c| c.at == *at).copied();
                 let mut piece = s.pile.fresh();
                 piece.extend(s.hull.iter().filter_map(of));
-                let (error, on) = best(&piece, &triangles);
+                let (error, on) = best(&piece, &triangles, false);
                 let fits = piece.len() <= CORNERS && ring.fits(error, &piece);
                 if fits {
-                    self.store(face, &piece, (error, on), true, &mut ring);
+                    let known = group.iter().map(|e| e.known).fold(f64::INFINITY, f64::min);
+                    self.store((face, known), &piece, (error, on), true, &mut ring);
                     s.pile.spare.push(piece);
                     from = to;
                     continue;
                 }
                 s.pile.spare.push(piece);
             }
-            for &(_, end) in group {
+            for &End { end, known, .. } in group {
                 let mut piece = s.pile.fresh();
                 piece.extend_from_slice(&s.corners[from..end as usize]);
                 from = end as usize;
                 s.pile.stack.push(piece);
-                self.put(face, &mut ring, &mut s.pile);
+                self.put((face, known), &mut ring, &mut s.pile);
             }
         }
         let error = ring.error;
         if let Some(body) = body {
             *body = Body::around(&s.ways, triangles.iter().map(Reach::normal).sum());
         }
+        let error = if error > 0.0 { error * (1.0 + 1e-9) + SLACK * self.finest.diagonal } else { 0.0 };
+        let known = error.max(below);
+        s.faces.iter().for_each(|&f| self.known[f as usize] = known);
+        s.pieces.iter().for_each(|&k| self.pieces[k as usize].known = known);
         self.scratch = s;
-        if error > 0.0 { error * (1.0 + 1e-9) + SLACK * self.finest.diagonal } else { 0.0 }
+        error
     }
 
     /// Takes up all that lies on the faces of a star. Of a face all of whose pieces are there the whole is taken; of another one piece that holds those there.
@@ -349,7 +382,10 @@ impl<'a> Walk<'a> {
             let face = group[0].0;
             let parts = &mut self.parts[face as usize];
             *parts -= group.len() as u32;
+            let known = |&(_, k): &(u32, u32)| self.pieces[k as usize].known;
+            let known = group.iter().map(known).fold(f64::INFINITY, f64::min);
             if *parts == 0 {
+                self.known[face as usize] = known;
                 s.whole.push(face);
             } else {
                 let shape = |&(_, k): &(u32, u32)| {
@@ -363,7 +399,7 @@ impl<'a> Walk<'a> {
                 let corner = |&at: &[f64; 2]| Corner { at, p: finest.at(face, at), d: 0.0, on: 0 };
                 for shape in &s.shapes {
                     s.corners.extend(shape.iter().map(corner));
-                    s.ends.push((face, s.corners.len() as u32));
+                    s.ends.push(End { face, end: s.corners.len() as u32, known });
                 }
             }
             for &(_, k) in group {
@@ -373,7 +409,7 @@ impl<'a> Walk<'a> {
     }
 
     /// Puts the piece of a face that is on the stack, in pieces if need be.
-    fn put(&mut self, face: u32, ring: &mut Ring<'_>, pile: &mut Pile) {
+    fn put(&mut self, (face, known): (u32, f64), ring: &mut Ring<'_>, pile: &mut Pile) {
         let (mut cuts, mut parts) = (0, 0);
         let most = CUTS + CUTS_A_FACE * ring.triangles.len();
         while let Some(piece) = pile.stack.pop() {
@@ -389,9 +425,10 @@ impl<'a> Walk<'a> {
                 pile.spare.push(piece);
                 continue;
             }
-            let (error, on) = best(&piece, ring.triangles);
+            let (error, on) = best(&piece, ring.triangles, false);
             let far = piece.iter().map(|c| c.d).fold(0.0, f64::max);
-            if !ring.fits(error, &piece) && cuts < most && self.cut(face, &piece, ring, pile) {
+            let fits = ring.fits(error, &piece);
+            if !fits && cuts < most && self.cut(face, &piece, ring, pile) {
                 cuts += 1;
             } else if error > FOLDED * far + ring.little()
                 && parts < most
@@ -399,7 +436,8 @@ impl<'a> Walk<'a> {
             {
                 parts += 1;
             } else {
-                self.store(face, &piece, (error, on), cuts + parts > 0, ring);
+                let on = if fits { (error, on) } else { best(&piece, ring.triangles, true) };
+                self.store((face, known), &piece, on, cuts + parts > 0, ring);
             }
             pile.spare.push(piece);
         }
@@ -408,7 +446,7 @@ impl<'a> Walk<'a> {
     /// Puts a piece on a face of the ring.
     fn store(
         &mut self,
-        face: u32,
+        (face, known): (u32, f64),
         piece: &[Corner],
         (error, on): (f64, usize),
         cut: bool,
@@ -417,12 +455,17 @@ impl<'a> Walk<'a> {
         let first = &mut self.first[ring.slots[on] as usize];
         let triangle = ring.triangles[on].corners;
         let whole = !cut && self.parts[face as usize] == 0;
+        // If another answers for so much already, this one need not.
+        let counts = error > if ring.ways.is_some() { 0.0 } else { known };
         if whole {
             self.next[face as usize] = std::mem::replace(&mut first[0], face);
+            if counts {
+                ring.faces.push(face);
+            }
         } else {
             let mut at = [[0.0; 2]; CORNERS];
             at.iter_mut().zip(piece).for_each(|(a, c)| *a = c.at);
-            let new = Piece { face, next: first[1], len: piece.len() as u8, at };
+            let new = Piece { face, next: first[1], len: piece.len() as u8, known, at };
             if self.free == NONE {
                 first[1] = self.pieces.len() as u32;
                 self.pieces.push(new);
@@ -432,10 +475,13 @@ impl<'a> Walk<'a> {
                 self.free = old.next;
                 *old = new;
             }
+            if counts {
+                ring.pieces.push(first[1]);
+            }
             self.parts[face as usize] += 1;
         }
-        ring.error = ring.error.max(error);
-        if error > 0.0 {
+        if counts {
+            ring.error = ring.error.max(error);
             for c in piece {
                 ring.extent.reach(ring.own.distance(c.p));
                 if let Some(ways) = &mut ring.ways {
@@ -452,7 +498,8 @@ impl Finest {
     /// A place on a face by the weights of its second and third corner.
     #[inline]
     fn at(&self, face: u32, [u, v]: [f64; 2]) -> DVec3 {
-        let [a, b, c] = self.corners[face as usize].map(|v| self.positions[v as usize]);
+        let [a, b, c] = self.corners[face as usize];
+        let (a, b, c) = (self.positions[a as usize], self.positions[b as usize], self.positions[c as usize]);
         // At corners exactly.
         if u == 1.0 {
             b

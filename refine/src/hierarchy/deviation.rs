@@ -91,8 +91,8 @@ fn by_error(forest: &Forest, error: impl Fn(u32) -> f64) -> Vec<u32> {
     let mut least: Vec<f64> = (0..n).map(error).collect();
     for i in (0..n).rev() {
         let e = least[i as usize];
-        for d in forest.needs.of(i) {
-            let up = &mut least[*d as usize];
+        for d in forest.needs.of(i).iter() {
+            let up = &mut least[d as usize];
             *up = up.max(e);
         }
     }

@@ -11,9 +11,9 @@ use crate::selective::Front;
 /// Vertices a face that are followed, on average.
 const FEW: usize = 4;
 
-/// For every split the largest distance of a vertex of the finest mesh that undoing it leads to, and the diagonal of the mesh's box. `front` is at full detail. O(n log n) for meshes whose hierarchy is as deep.
-pub(super) fn errors(pm: &ProgressiveMesh, forest: &Forest, mut front: Front) -> (Vec<f64>, f64) {
-    let Finest { positions: vertices, corners, origin, diagonal } = Finest::new(pm, forest, &front);
+/// For every split the largest distance of a vertex of the finest mesh that undoing it leads to. `front` is at full detail. O(n log n) for meshes whose hierarchy is as deep.
+pub(super) fn errors(pm: &ProgressiveMesh, forest: &Forest, mut front: Front, finest: &Finest) -> Vec<f64> {
+    let Finest { positions: vertices, corners, origin, .. } = finest;
     let mut positions = vertices.clone();
     // The first vertex on the face in each slot, the next of each, and how far it was when it was put there.
     let mut first = vec![NONE; corners.len()];
@@ -45,7 +45,7 @@ pub(super) fn errors(pm: &ProgressiveMesh, forest: &Forest, mut front: Front) ->
         let beside = front.beside(pm, i);
         front.unsplit(pm, forest, i);
         let vs = pm.splits.vertex[i as usize];
-        positions[vs as usize] = forest.place_before(pm, vs, i) - origin;
+        positions[vs as usize] = forest.place_before(pm, vs, i) - *origin;
         star.clear();
         if let Some(h) = beside {
             front.star(h, &mut star);
@@ -62,5 +62,5 @@ pub(super) fn errors(pm: &ProgressiveMesh, forest: &Forest, mut front: Front) ->
             errors[i as usize] = errors[i as usize].max(d);
         }
     }
-    (errors, diagonal)
+    errors
 }

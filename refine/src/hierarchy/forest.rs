@@ -4,6 +4,7 @@ use super::offsets::Offsets;
 use super::rings::Needs;
 use super::rows::Rows;
 use crate::aif::{NONE, Positions};
+use crate::packed::{Packed, Ranks, Run};
 use crate::progressive::ProgressiveMesh;
 use glam::DVec3;
 
@@ -12,71 +13,22 @@ use glam::DVec3;
 /// A *node* is a vertex as it is between two splits: the base's are `0..n0`, split `i` makes `n0 + 2 i` (the old vertex from then on) and
 /// `n0 + 2 i + 1` (the new one). Every node has at most one split that replaces it.
 ///
-/// What replaces what follows from the *chain* of each vertex, its splits in their order: 4 B a split, and where the chain begins.
+/// What replaces what follows from the *chain* of each vertex, its splits in their order: as many bits a split as numbers of splits have, and where the chain begins.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Forest {
     pub(crate) base_vertices: u32,
     base_faces: u32,
     faces: u32,
     starts: Offsets,
-    chains: Vec<u32>,
+    chains: Packed,
     two_faces: Ranks,
-    /// Of the faces of splits: those that are the first of theirs.
+    /// Of the faces of splits: those that are the first of theirs. Nothing where all splits make two.
     firsts: Ranks,
     moves: Ranks,
     /// What splits need by the rule of the hierarchy.
     pub(crate) needs: Needs,
     /// Where splits have their attributes; nothing without.
     pub(crate) rows: Option<Rows>,
-}
-
-/// Bits, and how many are set before each of them; nothing if none is.
-#[derive(Clone, Debug, Default)]
-struct Ranks {
-    bits: Vec<u64>,
-    /// Of every 64.
-    before: Vec<u32>,
-    set: usize,
-}
-
-impl Ranks {
-    fn new(all: impl Iterator<Item = bool>) -> Ranks {
-        let mut r = Ranks::default();
-        for (i, bit) in all.enumerate() {
-            if i % 64 == 0 {
-                r.bits.push(0);
-                r.before.push(r.set as u32);
-            }
-            if bit {
-                r.bits[i / 64] |= 1 << (i % 64);
-                r.set += 1;
-            }
-        }
-        if r.set == 0 {
-            return Ranks::default();
-        }
-        r.bits.shrink_to_fit();
-        r.before.shrink_to_fit();
-        r
-    }
-
-    #[inline]
-    fn before(&self, i: u32) -> u32 {
-        let (word, bit) = (i as usize / 64, i % 64);
-        match self.bits.get(word) {
-            Some(bits) => self.before[word] + (bits & ((1 << bit) - 1)).count_ones(),
-            None => 0,
-        }
-    }
-
-    #[inline]
-    fn get(&self, i: u32) -> bool {
-        self.bits.get(i as usize / 64).is_some_and(|bits| bits >> (i % 64) & 1 != 0)
-    }
-
-    fn bytes(&self) -> usize {
-        8 * self.bits.len() + 4 * self.before.len()
-    }
 }
 
 impl Forest {
@@ -97,14 +49,19 @@ impl Forest {
         let face = n + pm.splits.code.iter().filter(|c| c.two_faces()).count();
         let both = |two: bool| std::iter::once(true).chain(two.then_some(false));
         let base_faces = pm.base_faces.len() as u32;
+        let two_faces = Ranks::new(pm.splits.code.iter().map(|c| c.two_faces()));
+        let firsts = match two_faces.all() {
+            true => Ranks::default(),
+            false => Ranks::new(pm.splits.code.iter().flat_map(|c| both(c.two_faces()))),
+        };
         Forest {
             base_vertices: pm.base_vertices() as u32,
             base_faces,
             faces: base_faces + face as u32,
-            starts: Offsets::new(starts),
-            chains,
-            two_faces: Ranks::new(pm.splits.code.iter().map(|c| c.two_faces())),
-            firsts: Ranks::new(pm.splits.code.iter().flat_map(|c| both(c.two_faces()))),
+            starts: Offsets::new(&starts),
+            chains: Packed::of(&chains),
+            two_faces,
+            firsts,
             moves: Ranks::new(pm.splits.code.iter().map(|c| c.moves())),
             needs: Needs::default(),
             rows: Rows::new(pm),
@@ -124,21 +81,27 @@ impl Forest {
 
     /// The splits of vertex `v`, ascending.
     #[inline(always)]
-    pub(crate) fn chain(&self, v: u32) -> &[u32] {
-        &self.chains[self.starts.run(v)]
+    pub(crate) fn chain(&self, v: u32) -> Run<'_> {
+        self.chains.run(self.starts.run(v))
+    }
+
+    /// The chain of a vertex that is never split.
+    #[inline]
+    pub(crate) fn no_chain(&self) -> Run<'_> {
+        self.chains.run(0..0)
     }
 
     /// How many splits of its vertex come before split `i`.
     #[inline]
     fn turn(&self, pm: &ProgressiveMesh, i: u32) -> usize {
-        self.chain(pm.splits.vertex[i as usize]).partition_point(|&j| j < i)
+        self.chain(pm.splits.vertex[i as usize]).partition_point(|j| j < i)
     }
 
     /// The node of vertex `v` after the first `k` splits of its chain.
     #[inline]
     pub(crate) fn node_after(&self, v: u32, k: usize) -> u32 {
         match (k.checked_sub(1), v.checked_sub(self.base_vertices)) {
-            (Some(last), _) => self.base_vertices + 2 * self.chain(v)[last],
+            (Some(last), _) => self.base_vertices + 2 * self.chain(v).at(last),
             (None, Some(maker)) => self.base_vertices + 2 * maker + 1,
             (None, None) => v,
         }
@@ -154,7 +117,7 @@ impl Forest {
         let mut ups = vec![NONE; self.len()];
         for v in 0..self.base_vertices + self.len() as u32 {
             let mut up = v.checked_sub(self.base_vertices).unwrap_or(NONE);
-            for &i in self.chain(v) {
+            for i in self.chain(v).iter() {
                 ups[i as usize] = std::mem::replace(&mut up, i);
             }
         }
@@ -185,9 +148,9 @@ impl Forest {
     #[inline]
     pub(crate) fn below(&self, pm: &ProgressiveMesh, i: u32) -> [u32; 2] {
         let chain = self.chain(pm.splits.vertex[i as usize]);
-        let old = chain.get(chain.partition_point(|&j| j <= i));
+        let old = chain.get(chain.partition_point(|j| j <= i));
         let new = self.chain(self.base_vertices + i).first();
-        [old, new].map(|s| s.copied().unwrap_or(NONE))
+        [old, new].map(|s| s.unwrap_or(NONE))
     }
 
     /// Split `i` makes two faces.
@@ -209,48 +172,44 @@ impl Forest {
             return None;
         }
         let k = f.checked_sub(self.base_faces)?;
+        if self.two_faces.all() {
+            return Some((k / 2, k % 2 == 1));
+        }
         // As many splits have begun as faces that are the first of theirs.
         let first = self.firsts.get(k);
         Some((self.firsts.before(k) + u32::from(first) - 1, !first))
     }
 
-    /// Where vertex `v` stands after splits of its chain, the first ones: the array, and the place in it.
-    #[inline]
-    fn stored<'a>(&self, pm: &'a ProgressiveMesh, v: u32, applied: &[u32]) -> (&'a Positions, usize) {
-        if self.moves.set > 0
-            && let Some(&j) = applied.iter().rev().find(|&&j| self.moves.get(j))
+    /// Where vertex `v` stands after splits of its chain, the first ones. O(those that do not move it).
+    #[inline(always)]
+    pub(crate) fn place_after(&self, pm: &ProgressiveMesh, v: u32, applied: Run<'_>) -> DVec3 {
+        if !self.moves.none()
+            && let Some(j) = applied.iter().rev().find(|&j| self.moves.get(j))
         {
-            return (&pm.moved_positions, self.moves.before(j) as usize);
+            return pm.moved_positions.get(self.moves.before(j) as usize);
         }
         match v.checked_sub(self.base_vertices) {
-            None => (&pm.base_positions, v as usize),
-            Some(i) => (&pm.new_positions, i as usize),
+            None => pm.base_positions.get(v as usize),
+            Some(i) => pm.new_positions.get(i as usize),
         }
-    }
-
-    /// Where vertex `v` stands after splits of its chain, the first ones. O(those that do not move it).
-    #[inline]
-    pub(crate) fn place_after(&self, pm: &ProgressiveMesh, v: u32, applied: &[u32]) -> DVec3 {
-        let (from, at) = self.stored(pm, v, applied);
-        from.get(at)
     }
 
     /// Where vertex `v` stands after the first `k` splits of its chain. O(splits of it that do not move it).
     #[inline]
     pub(crate) fn place(&self, pm: &ProgressiveMesh, v: u32, k: usize) -> DVec3 {
-        self.place_after(pm, v, &self.chain(v)[..k])
+        self.place_after(pm, v, self.chain(v).prefix(k))
     }
 
     /// Where vertex `v` stands before split `i`, one of its chain.
     #[inline]
     pub(crate) fn place_before(&self, pm: &ProgressiveMesh, v: u32, i: u32) -> DVec3 {
-        self.place(pm, v, self.chain(v).partition_point(|&j| j < i))
+        self.place(pm, v, self.chain(v).partition_point(|j| j < i))
     }
 
     /// Where node `k`, which is vertex `v`, stands.
     pub(crate) fn position(&self, pm: &ProgressiveMesh, k: u32, v: u32) -> DVec3 {
         let after = match k.checked_sub(self.base_vertices) {
-            Some(at) if at & 1 == 0 => self.chain(v).partition_point(|&j| j <= at >> 1),
+            Some(at) if at & 1 == 0 => self.chain(v).partition_point(|j| j <= at >> 1),
             _ => 0,
         };
         self.place(pm, v, after)
@@ -258,17 +217,17 @@ impl Forest {
 
     /// [`Forest::place`] in the stored precision, appended to `out`.
     pub(crate) fn append_place(&self, pm: &ProgressiveMesh, v: u32, k: usize, out: &mut Positions) {
-        let (from, i) = self.stored(pm, v, &self.chain(v)[..k]);
-        match (from, out) {
-            (Positions::F32(a), Positions::F32(b)) => b.push(a[i]),
-            (Positions::F64(a), Positions::F64(b)) => b.push(a[i]),
-            _ => {}
+        let place = self.place(pm, v, k);
+        match out {
+            // It was f32.
+            Positions::F32(all) => all.push(place.as_vec3().to_array()),
+            Positions::F64(all) => all.push(place.to_array()),
         }
     }
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        4 * self.chains.len()
+        self.chains.bytes()
             + self.starts.bytes()
             + self.needs.bytes()
             + self.rows.as_ref().map_or(0, Rows::bytes)
@@ -284,16 +243,6 @@ mod tests {
     use super::*;
     use crate::progressive::{SplitCode, Splits};
 
-    #[test]
-    fn ranks_count_what_is_set_before() {
-        let bits: Vec<bool> = (0..300).map(|i| i % 3 == 0 || i % 7 == 2).collect();
-        let r = Ranks::new(bits.iter().copied());
-        for i in 0..300 {
-            assert_eq!(r.before(i as u32) as usize, bits[..i].iter().filter(|b| **b).count());
-            assert_eq!(r.get(i as u32), bits[i]);
-        }
-    }
-
     /// Splits of any vertices, of one face or two; some move theirs. No mesh: only what the forest looks at.
     fn any() -> ProgressiveMesh {
         let n = 400u32;
@@ -307,8 +256,8 @@ mod tests {
         ProgressiveMesh {
             base_faces: vec![[0, 1, 2]; 7],
             base_positions: points(3, 1.0),
-            new_positions: points(n as usize, 2.0),
-            moved_positions: points(moved, 3.0),
+            new_positions: points(n as usize, 2.0).into(),
+            moved_positions: points(moved, 3.0).into(),
             splits: Splits {
                 vertex: (0..n).map(|i| i.wrapping_mul(2654435761) % (3 + i)).collect(),
                 code,

@@ -16,6 +16,7 @@
 use super::Forest;
 use super::offsets::Offsets;
 use crate::aif::NONE;
+use crate::packed::{Packed, Run};
 use crate::progressive::{Damage, ProgressiveMesh};
 use crate::selective::Front;
 
@@ -23,7 +24,7 @@ use crate::selective::Front;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Needs {
     starts: Offsets,
-    on: Vec<u32>,
+    on: Packed,
 }
 
 impl Needs {
@@ -41,18 +42,17 @@ impl Needs {
             }
             starts.push(all.len() as u32);
         }
-        all.shrink_to_fit();
-        Needs { starts: Offsets::new(starts), on: all }
+        Needs { starts: Offsets::new(&starts), on: Packed::of(&all) }
     }
 
     /// What split `i` needs, each once.
     #[inline]
-    pub(crate) fn of(&self, i: u32) -> &[u32] {
-        &self.on[self.starts.run(i)]
+    pub(crate) fn of(&self, i: u32) -> Run<'_> {
+        self.on.run(self.starts.run(i))
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        self.starts.bytes() + 4 * self.on.len()
+        self.starts.bytes() + self.on.bytes()
     }
 }
 
@@ -151,13 +151,12 @@ impl Rings {
     }
 
     /// What splits need, and the longest chains to each; `None` if the rule does not hold for this mesh.
-    pub(super) fn finish(mut self) -> Option<(Needs, Vec<u32>)> {
+    pub(super) fn finish(self) -> Option<(Needs, Vec<u32>)> {
         let mut dependents = vec![0u32; self.turns.len()];
         self.all.iter().for_each(|&d| dependents[d as usize] += 1);
         // Views count them in 16 bits.
         let few = dependents.iter().all(|&n| n <= u16::MAX.into());
-        self.all.shrink_to_fit();
-        let needs = Needs { starts: Offsets::new(self.starts), on: self.all };
+        let needs = Needs { starts: Offsets::new(&self.starts), on: Packed::of(&self.all) };
         (self.whole && few).then_some((needs, self.turns))
     }
 }

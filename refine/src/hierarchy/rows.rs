@@ -70,8 +70,8 @@ impl Rows {
         let code = &pm.splits.code;
         let vertex = pm.splits.vertex[i as usize];
         let chain = forest.chain(vertex);
-        let before = &chain[..chain.partition_point(|&j| j < i)];
-        if let Some(&j) = before.iter().rev().find(|&&j| code[j as usize].changes_rows()) {
+        let before = chain.prefix(chain.partition_point(|j| j < i));
+        if let Some(j) = before.iter().rev().find(|&j| code[j as usize].changes_rows()) {
             return match code[j as usize].kind() {
                 SplitKind::Plain => self.of(pm, j).row + 1,
                 _ => NONE,

@@ -1,13 +1,14 @@
 //! From the mesh of the last frame to that of this one, fetching what it needs.
 
 use super::page::LED;
+use super::ready::LOT;
 use super::shelf::Fetch;
 use super::timed::CHANGE;
 use super::{PagedError, PagedView};
 use crate::aif::NONE;
 use crate::format::{ByteRanges, CONTRADICTS, FormatError};
 use crate::progressive::Damage;
-use crate::selective::{Done, Due, Judges, Lens, Limits, Meter};
+use crate::selective::{Clocks, Done, Due, Entry, Judges, Lens, Limits, Looked, Many, Meter};
 use std::cmp::Reverse;
 
 /// How far a frame may go.
@@ -66,8 +67,53 @@ struct Frame<'a> {
     meter: Meter<'a>,
     fetches: usize,
     all: PagedDone,
+    /// There was no room for what pages were fetched for: others are not, or they would go and come in turn.
+    full: bool,
     /// Both lists were looked through from their ends, not from where the last frame was cut short.
     whole: bool,
+}
+
+/// Needed splits whose pages other threads make while one is decoded.
+const IN_SIGHT: usize = 64;
+
+/// Of the two lists.
+#[derive(Clone, Copy)]
+enum Which {
+    Last,
+    Open,
+}
+
+/// A lot of splits that are looked at: where they are in a list, and what is found out.
+struct Desk<'a> {
+    judges: Judges<'a>,
+    next: Many<'a>,
+    last: Many<'a>,
+    places: Vec<u32>,
+    entries: Vec<Entry>,
+    looked: Looked,
+}
+
+impl<'a> Desk<'a> {
+    fn new(judges: &Judges<'a>, clock: &Clocks) -> Self {
+        Desk {
+            judges: *judges,
+            next: clock.next(judges),
+            last: clock.last(judges),
+            places: Vec::with_capacity(LOT),
+            entries: Vec::with_capacity(LOT),
+            looked: Looked::default(),
+        }
+    }
+
+    fn clear(&mut self) {
+        self.places.clear();
+        self.entries.clear();
+    }
+
+    fn put(&mut self, place: u32, entry: &Entry) {
+        self.places.push(place);
+        self.entries.push(*entry);
+    }
 }
 
 /// Where to begin looking through a list of `len`, downwards, and whether that is its end.
@@ -89,21 +135,26 @@ impl<S: ByteRanges> PagedView<S> {
     /// Errors: damage, the source's. The mesh is sound then, and closed, somewhere on the way.
     pub fn adapt(&mut self, lenses: &[Lens], limits: &PagedLimits<'_>) -> Result<PagedDone, PagedError> {
         let meter = Meter::new(&limits.limits);
-        let mut frame = Frame { meter, fetches: limits.fetches, all: PagedDone::default(), whole: true };
-        self.shelf.clock += 1;
+        let mut frame =
+            Frame { meter, fetches: limits.fetches, all: PagedDone::default(), full: false, whole: true };
+        self.set_aside();
+        self.shelf.next_frame();
         let judges = Judges::new(lenses, limits.limits.hysteresis);
         let stands = self.clock.go_on(&judges);
         // What was not looked at may have become due long ago: times would come round. Errors end frames as well.
         let cut = std::mem::replace(&mut self.cut, true);
         let all = cut || !stands;
-        self.coarsen(&judges, all, &mut frame)?;
+        self.made.clear();
+        let mut desk = Desk::new(&judges, &self.clock);
+        self.coarsen(&mut desk, all, &mut frame)?;
         // Once more without what lingers, if it takes the room.
         for attempt in 0..2 {
             if frame.meter.over || (attempt > 0 && (frame.all.no_room == 0 || !self.make_way()?)) {
                 break;
             }
             frame.all.no_room = 0;
-            let result = self.refine(&judges, all, &mut frame);
+            frame.full = false;
+            let result = self.refine(&mut desk, all, &mut frame);
             self.queue.clear();
             result?;
         }
@@ -115,117 +166,261 @@ impl<S: ByteRanges> PagedView<S> {
         Ok(*all)
     }
 
-    fn coarsen(&mut self, judges: &Judges<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
+    /// Undoes what is not needed, until nothing is left that could be. A lot at a time is looked at, and undone.
+    fn coarsen(&mut self, desk: &mut Desk<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
         let (mut at, whole) = start(self.resume[0], self.last.len());
-        let mut stack = Vec::new();
+        let mut freed = Vec::new();
+        let mut lot = Vec::with_capacity(LOT);
         loop {
-            // Undoing takes out of the list.
-            at = self.last.next_due(at, all, &self.clock);
-            if at == 0 || !frame.meter.goes_on() {
+            // Undoing takes out of the list: what comes to a place that is yet to come is looked at again if it is due.
+            let from = at;
+            at = self.take_due(Which::Last, at, all, desk, frame);
+            if desk.places.is_empty() {
                 break;
             }
-            at -= 1;
-            let Some(o) = self.last.get(at) else { break };
-            frame.meter.looks += 1;
-            let (wanted, due) = self.clock.of_last(judges, &o.entry);
-            if wanted {
-                self.last.set_due(at, due);
-                continue;
+            self.sift(desk, &mut lot);
+            self.undo_lot(&lot, &mut freed, frame)?;
+            // A lot at a time, the rest at the end.
+            while freed.len() >= LOT && !frame.meter.over {
+                self.undo_freed(desk, &mut freed, &mut lot, frame)?;
             }
-            stack.push(o.entry.split);
-            while let Some(i) = stack.pop() {
-                let place = self.shelf.last_place(i) as usize;
-                let Some(o) = self.last.get(place).filter(|o| o.entry.split == i) else { continue };
-                frame.meter.looks += 1;
-                if judges.keep(&o.entry) {
-                    continue;
-                }
-                if !frame.meter.goes_on() {
-                    break;
-                }
-                let needs = self.undo(i)?;
-                frame.meter.done.collapses += 1;
-                frame.meter.since += 1;
-                stack.extend(needs.into_iter().filter(|&d| d != NONE && self.is_free(d)));
+            if frame.meter.over {
+                at = from;
+                break;
             }
+        }
+        while !freed.is_empty() && !frame.meter.over {
+            self.undo_freed(desk, &mut freed, &mut lot, frame)?;
         }
         self.resume[0] = at;
         frame.whole &= whole;
         Ok(())
     }
 
-    fn refine(&mut self, judges: &Judges<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
-        let (mut at, whole) = start(self.resume[1], self.open.len());
-        loop {
-            at = self.open.next_due(at, all, &self.clock);
-            if at == 0 || !frame.meter.goes_on() {
-                break;
-            }
-            at -= 1;
-            let Some(&o) = self.open.get(at) else { break };
-            frame.meter.looks += 1;
-            let (wanted, due) = self.clock.of_next(judges, &o.entry);
-            if !wanted {
-                self.open.set_due(at, due);
-                continue;
-            }
-            // Until it is applied.
-            self.open.set_due(at, Due::NOW);
-            let (split, rank) = (o.entry.split, judges.rank(&o.entry));
-            self.enqueue(rank, split, frame);
-        }
-        self.resume[1] = at;
-        frame.whole &= whole;
-        while let Some((_, Reverse(i))) = self.queue.pop() {
-            if self.shelf.is_led(i) {
-                continue;
-            }
+    /// Undoes splits that could be and are not needed; appends what could be then.
+    fn undo_lot(
+        &mut self,
+        lot: &[u32],
+        freed: &mut Vec<u32>,
+        frame: &mut Frame<'_>,
+    ) -> Result<(), PagedError> {
+        self.ready_to_undo(lot);
+        for &i in lot {
             if !frame.meter.goes_on() {
                 return Ok(());
             }
-            // Nor is anything fetched for it then.
-            if frame.meter.is_full(self.led_faces) {
-                frame.meter.done.refused += 1 + self.queue.len();
-                return Ok(());
+            if self.shelf.last_place(i) == NONE {
+                continue;
             }
-            let mut closure = std::mem::take(&mut self.closure);
-            closure.clear();
-            let gathered = self.gather(i, &mut closure, frame);
-            closure.iter().for_each(|&j| self.shelf.mark(j, false));
-            // What a split depends on was made before it.
-            closure.sort_unstable();
-            closure.dedup();
-            let applied = gathered.and_then(|g| match g {
-                Gathered::Whole => self.apply_all(&closure, i, frame, judges),
-                Gathered::NoRoom => {
-                    frame.all.no_room += 1;
-                    Ok(())
-                }
-                Gathered::Postponed => {
-                    frame.all.postponed += 1;
-                    Ok(())
-                }
-            });
-            self.closure = closure;
-            applied?;
+            let needs = self.undo(i)?;
+            frame.meter.done.collapses += 1;
+            frame.meter.since += 1;
+            freed.extend(needs.into_iter().filter(|&d| d != NONE && self.is_free(d)));
         }
         Ok(())
     }
 
-    fn apply_all(
+    /// Looks at some of what has become free, and undoes what is not needed.
+    fn undo_freed(
         &mut self,
-        closure: &[u32],
-        i: u32,
+        desk: &mut Desk<'_>,
+        freed: &mut Vec<u32>,
+        lot: &mut Vec<u32>,
         frame: &mut Frame<'_>,
-        judges: &Judges<'_>,
     ) -> Result<(), PagedError> {
-        let two = |j: u32| self.shelf.page(j).is_some_and(|(p, k)| p.code[k].two_faces());
+        let part = freed.len() - freed.len().min(LOT);
+        desk.clear();
+        for &i in &freed[part..] {
+            let place = self.shelf.last_place(i);
+            // It may have come in twice.
+            if let Some(o) = self.last.get(place as usize).filter(|o| o.entry.split == i) {
+                desk.put(place, &o.entry);
+            }
+        }
+        freed.truncate(part);
+        frame.meter.looks += desk.places.len();
+        self.sift(desk, lot);
+        self.undo_lot(lot, freed, frame)
+    }
+
+    /// Looks at those on the desk, which could be undone: into `lot` goes what is not needed, of the others is noted when they are due.
+    fn sift(&mut self, desk: &mut Desk<'_>, lot: &mut Vec<u32>) {
+        self.clock.look(&desk.last, &desk.entries, &mut desk.looked);
+        lot.clear();
+        for ((&place, e), (wanted, due)) in desk.places.iter().zip(&desk.entries).zip(desk.looked.each()) {
+            if wanted { self.last.set_due(place as usize, due) } else { lot.push(e.split) }
+        }
+    }
+
+    /// Puts what is due of a list on the desk, downwards from `at`, a lot at most; returns where to go on.
+    fn take_due(
+        &self,
+        which: Which,
+        mut at: usize,
+        all: bool,
+        desk: &mut Desk<'_>,
+        frame: &mut Frame<'_>,
+    ) -> usize {
+        let list = match which {
+            Which::Last => &self.last,
+            Which::Open => &self.open,
+        };
+        desk.clear();
+        while desk.places.len() < LOT {
+            let next = list.next_due(at, all, &self.clock);
+            if next == 0 || !frame.meter.goes_on() {
+                at = next;
+                break;
+            }
+            at = next - 1;
+            desk.places.push(at as u32);
+            frame.meter.looks += 1;
+        }
+        // Apart: far places are waited for together.
+        let entries = desk.places.iter().map_while(|&p| list.get(p as usize)).map(|o| o.entry);
+        desk.entries.extend(entries);
+        at
+    }
+
+    fn refine(&mut self, desk: &mut Desk<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
+        let (mut at, whole) = start(self.resume[1], self.open.len());
+        loop {
+            at = self.take_due(Which::Open, at, all, desk, frame);
+            if desk.places.is_empty() {
+                break;
+            }
+            self.look_at_open(desk, frame);
+        }
+        self.resume[1] = at;
+        frame.whole &= whole;
+        let mut lot = Vec::with_capacity(LOT);
+        while let Some(&(rank, _)) = self.queue.peek() {
+            // Of one rank a lot.
+            lot.clear();
+            while lot.len() < LOT
+                && let Some(&(r, Reverse(i))) = self.queue.peek()
+                && r == rank
+            {
+                self.queue.pop();
+                if !self.shelf.is_led(i) {
+                    lot.push(i);
+                }
+            }
+            if self.shelf.looks_ahead {
+                // Those on top of the queue come next.
+                let next = self.queue.iter().take(IN_SIGHT).map(|q| q.1.0);
+                lot.iter().copied().chain(next).for_each(|i| _ = self.shelf.wish(i));
+            }
+            self.ready_to_apply(&lot);
+            for (k, &i) in lot.iter().enumerate() {
+                if self.shelf.is_led(i) {
+                    continue;
+                }
+                if !frame.meter.goes_on() {
+                    return Ok(());
+                }
+                // Nor is anything fetched for it then.
+                if frame.meter.is_full(self.led_faces) {
+                    frame.meter.done.refused += lot.len() - k + self.queue.len();
+                    return Ok(());
+                }
+                self.apply_with_all(i, frame)?;
+                if self.made.len() >= LOT {
+                    self.look_at_made(desk, frame);
+                }
+            }
+            self.look_at_made(desk, frame);
+        }
+        Ok(())
+    }
+
+    /// Decides about what is on the desk of the list of what could come next.
+    fn look_at_open(&mut self, desk: &mut Desk<'_>, frame: &mut Frame<'_>) {
+        self.clock.look(&desk.next, &desk.entries, &mut desk.looked);
+        for ((&place, e), (wanted, due)) in desk.places.iter().zip(&desk.entries).zip(desk.looked.each()) {
+            // Until it is applied.
+            let due = if wanted { Due::NOW } else { self.ahead_of(e, due, &desk.judges) };
+            self.open.set_due(place as usize, due);
+            if wanted {
+                self.enqueue(desk.judges.rank(e), e.split, frame);
+            }
+        }
+    }
+
+    /// When to look again at a split that is not needed now: if its page is not there, some frames before it can be needed. If it is then as if it would be, its page is made by another thread.
+    fn ahead_of(&mut self, e: &Entry, due: Due, judges: &Judges<'_>) -> Due {
+        if !self.shelf.looks_ahead || !self.shelf.is_missing(e.split) {
+            return due;
+        }
+        let (early, soon) = self.clock.ahead_of(due);
+        if soon && self.clock.will_want(judges, e) && self.shelf.wish(e.split) { due } else { early }
+    }
+
+    /// Looks at what the splits that were applied last have brought: what could come next, and what could be undone. So the next frame knows.
+    fn look_at_made(&mut self, desk: &mut Desk<'_>, frame: &mut Frame<'_>) {
+        let made = std::mem::take(&mut self.made);
+        for part in made.chunks(LOT / 2) {
+            desk.clear();
+            for &i in part {
+                let old = self.shelf.head.base_vertices + 2 * i;
+                for (k, place) in (old..).zip(self.shelf.record(i).map_or([NONE; 2], |r| r.open_place)) {
+                    if let Some(o) = self.open.get(place as usize).filter(|o| o.node == k) {
+                        desk.put(place, &o.entry);
+                    }
+                }
+            }
+            self.look_at_open(desk, frame);
+            desk.clear();
+            for &i in part {
+                let place = self.shelf.last_place(i);
+                if let Some(o) = self.last.get(place as usize).filter(|o| o.entry.split == i) {
+                    desk.put(place, &o.entry);
+                }
+            }
+            self.clock.look(&desk.last, &desk.entries, &mut desk.looked);
+            for (&place, (wanted, due)) in desk.places.iter().zip(desk.looked.each()) {
+                if wanted {
+                    self.last.set_due(place as usize, due);
+                }
+            }
+        }
+        self.made = made;
+        self.made.clear();
+    }
+
+    /// Applies a split that is needed, and what it depends on, as far as there is room and its pages are there or may be fetched.
+    fn apply_with_all(&mut self, i: u32, frame: &mut Frame<'_>) -> Result<(), PagedError> {
+        let mut closure = std::mem::take(&mut self.closure);
+        closure.clear();
+        let gathered = self.gather(i, &mut closure, frame);
+        closure.iter().for_each(|&j| self.shelf.mark(j, false));
+        // What a split depends on was made before it.
+        closure.sort_unstable();
+        closure.dedup();
+        let applied = gathered.and_then(|g| match g {
+            Gathered::Whole => self.apply_all(&closure, i, frame),
+            Gathered::NoRoom => {
+                frame.all.no_room += 1;
+                Ok(())
+            }
+            Gathered::Postponed => {
+                frame.all.postponed += 1;
+                Ok(())
+            }
+        });
+        self.closure = closure;
+        applied
+    }
+
+    fn apply_all(&mut self, closure: &[u32], i: u32, frame: &mut Frame<'_>) -> Result<(), PagedError> {
+        let two = |j: u32| self.shelf.record(j).is_some_and(|r| r.code.two_faces());
         let more: usize = closure.iter().map(|&j| 1 + two(j) as usize).sum();
         if self.led_faces + more > frame.meter.limits.faces {
             frame.meter.done.refused += 1;
             return Ok(());
         }
         if !self.reserve(closure.len()) {
+            frame.full = true;
             frame.all.no_room += 1;
             return Ok(());
         }
@@ -234,18 +429,11 @@ impl<S: ByteRanges> PagedView<S> {
                 return Ok(());
             }
             self.apply(j)?;
+            self.made.push(j);
             let done = &mut frame.meter.done;
             done.splits += 1;
             done.forced += usize::from(j != i);
             frame.meter.since += 1;
-            let old = self.shelf.head.base_vertices + 2 * j;
-            for k in [old, old + 1] {
-                let place = self.shelf.open_place(k) as usize;
-                if let Some(o) = self.open.get(place).filter(|o| o.node == k && judges.want(&o.entry)) {
-                    let (next, rank) = (o.entry.split, judges.rank(&o.entry));
-                    self.enqueue(rank, next, frame);
-                }
-            }
         }
         Ok(())
     }
@@ -267,13 +455,15 @@ impl<S: ByteRanges> PagedView<S> {
     fn gather(&mut self, i: u32, out: &mut Vec<u32>, frame: &mut Frame<'_>) -> Result<Gathered, PagedError> {
         self.shelf.clock += 1;
         out.push(i);
-        let mut k = 0;
+        let (mut k, before) = (0, frame.all.fetched);
         while let Some(&j) = out.get(k) {
             if let Fetch::Missing(most) = self.shelf.ask(j) {
                 if frame.all.fetched >= frame.fetches {
                     return Ok(Gathered::Postponed);
                 }
-                if !self.make_room(most) {
+                if frame.full || !self.make_room(most) {
+                    // What was fetched for it would go for the next, and come again.
+                    frame.full |= frame.all.fetched > before;
                     return Ok(Gathered::NoRoom);
                 }
                 // Few chunks take more on the way than is set aside; and damage may look so.
@@ -310,12 +500,12 @@ impl<S: ByteRanges> PagedView<S> {
     }
 
     fn is_free(&self, i: u32) -> bool {
-        self.shelf.page(i).is_some_and(|(p, k)| p.flags[k] & LED != 0 && p.dependents[k] == 0)
+        self.shelf.record(i).is_some_and(|r| r.flags & LED != 0 && r.dependents == 0)
     }
 
     /// Asks for split `i`, whose page is there, whose dependencies are asked for, and for which there is room; with geomorphs by time it is applied later.
     fn apply(&mut self, i: u32) -> Result<(), PagedError> {
-        let needs = self.can_count(i, |p| &p.dependents)?;
+        let needs = self.can_count(i, |r| r.dependents)?;
         let (node, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
         if self.motions.is_none() {
             self.split_faces(i)?;

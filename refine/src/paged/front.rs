@@ -1,6 +1,6 @@
 //! A split and its undoing on the faces shown, with what stands in pages.
 
-use super::page::{APPLIED, LED, Page, RowRef};
+use super::page::{APPLIED, LED, Record, RowRef};
 use super::{PagedError, PagedView};
 use crate::aif::NONE;
 use crate::format::ByteRanges;
@@ -15,9 +15,9 @@ impl<S: ByteRanges> PagedView<S> {
         let rows = p.split_rows.get(k);
         let known = Known {
             split: i,
-            vertex: p.vertex[k],
+            vertex: p.of[k].vertex,
             new_vertex,
-            code: p.code[k],
+            code: p.of[k].code,
             wedge: rows.map_or(new_vertex, |r| r.wedge),
             row: rows.map_or(0, |r| r.row),
         };
@@ -46,15 +46,15 @@ impl<S: ByteRanges> PagedView<S> {
     pub(super) fn split_faces(&mut self, i: u32) -> Result<(), PagedError> {
         let at = i as usize;
         let (s, explicit) = self.known(i)?;
-        let Some((p, k)) = self.shelf.page(i) else { return Err(Damage::Fan(at).into()) };
-        let (left, right, parent) = (p.left[k], p.right[k], p.links.parent[k]);
+        let Some(r) = self.shelf.record(i) else { return Err(Damage::Fan(at).into()) };
+        let (left, right, parent) = (r.left, r.right, r.parent);
         // The vertex is at the node that the split replaces.
         if self.shelf.node(s.vertex) != parent {
             return Err(Damage::Fan(at).into());
         }
         let mut needs = [NONE; 3];
         if self.motions.is_some() {
-            needs = self.can_count(i, |p| &p.holders)?;
+            needs = self.can_count(i, |r| r.holders)?;
         }
         let right = if s.code.two_faces() { self.cut(i, right)? } else { NONE };
         let cuts = (self.cut(i, left)?, right);
@@ -69,15 +69,15 @@ impl<S: ByteRanges> PagedView<S> {
         }
         if self.motions.is_some() {
             self.pending -= usize::from(self.shelf.is_led(i));
-            self.count(needs, |p| &mut p.holders, 1);
+            self.count(needs, |r| &mut r.holders, 1);
         }
         Ok(())
     }
 
     /// What split `i` depends on can have one more that depends on it. Honest meshes have few: what a hostile file says of more is damage.
-    pub(super) fn can_count(&self, i: u32, of: impl Fn(&Page) -> &Vec<u8>) -> Result<[u32; 3], Damage> {
+    pub(super) fn can_count(&self, i: u32, of: impl Fn(&Record) -> u8) -> Result<[u32; 3], Damage> {
         let needs = self.shelf.needs(i).ok_or(Damage::Fan(i as usize))?;
-        let full = |d: u32| self.shelf.page(d).is_none_or(|(p, k)| of(p)[k] > u8::MAX - 3);
+        let full = |d: u32| self.shelf.record(d).is_none_or(|r| of(r) > u8::MAX - 3);
         match needs.into_iter().any(|d| d != NONE && full(d)) {
             true => Err(Damage::Fan(i as usize)),
             false => Ok(needs),
@@ -85,10 +85,10 @@ impl<S: ByteRanges> PagedView<S> {
     }
 
     /// Adds `by` to what is counted of these splits.
-    fn count(&mut self, splits: [u32; 3], of: impl Fn(&mut Page) -> &mut Vec<u8>, by: i8) {
+    fn count(&mut self, splits: [u32; 3], of: impl Fn(&mut Record) -> &mut u8, by: i8) {
         for d in splits.into_iter().filter(|&d| d != NONE) {
-            if let Some((p, k)) = self.shelf.page_mut(d) {
-                let n = &mut of(p)[k];
+            if let Some(r) = self.shelf.record_mut(d) {
+                let n = of(r);
                 *n = n.wrapping_add_signed(by);
             }
         }
@@ -102,13 +102,13 @@ impl<S: ByteRanges> PagedView<S> {
         if let Some((p, k)) = self.shelf.page_mut(i) {
             p.set(k, LED, on);
             p.turned |= timed;
-            drawn = p.flags[k] & APPLIED != 0;
-            faces = 1 + p.code[k].two_faces() as usize;
+            drawn = p.of[k].flags & APPLIED != 0;
+            faces = 1 + p.of[k].code.two_faces() as usize;
             if !on {
                 p.stamp = clock;
             }
         }
-        self.count(needs, |p| &mut p.dependents, if on { 1 } else { -1 });
+        self.count(needs, |r| &mut r.dependents, if on { 1 } else { -1 });
         let pending = usize::from(timed && !drawn);
         if on {
             self.led += 1;
@@ -125,10 +125,9 @@ impl<S: ByteRanges> PagedView<S> {
     /// Undoes split `i`, which is applied and on which nothing applied depends. O(valence).
     pub(super) fn unsplit_faces(&mut self, i: u32) -> Result<(), PagedError> {
         let (s, explicit) = self.known(i)?;
-        let (parent, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
-        let face = self.shelf.head.first_face(i);
-        let fl = self.shelf.slot_of(face);
-        let fr = if s.code.two_faces() { self.shelf.slot_of(face + 1) } else { fl };
+        let r = self.shelf.record(i).ok_or(Damage::Fan(i as usize))?;
+        let (parent, [fl, fr]) = (r.parent, r.slots);
+        let fr = if s.code.two_faces() { fr } else { fl };
         if fl == NONE || fr == NONE {
             return Err(Damage::Fan(i as usize).into());
         }
@@ -144,7 +143,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         if self.motions.is_some() {
             let needs = self.shelf.needs(i).unwrap_or([NONE; 3]);
-            self.count(needs, |p| &mut p.holders, -1);
+            self.count(needs, |r| &mut r.holders, -1);
         }
         Ok(())
     }
@@ -159,14 +158,12 @@ impl<S: ByteRanges> PagedView<S> {
             (self.fans.corners.len() - 1) as u32
         });
         self.face_in[slot as usize] = f;
-        self.shelf.set_slot(f, slot);
         self.faces += 1;
         slot
     }
 
-    fn leave_slot(&mut self, f: u32, slot: u32) {
+    fn leave_slot(&mut self, slot: u32) {
         self.face_in[slot as usize] = NONE;
-        self.shelf.set_slot(f, NONE);
         self.free.push(slot);
         self.faces -= 1;
     }
@@ -220,14 +217,20 @@ impl<S: ByteRanges> Sheet for PagedView<S> {
     fn take_slots(&mut self, of: &Known) -> [u32; 2] {
         let face = self.shelf.head.first_face(of.split);
         let left = self.take_slot(face);
-        [left, if of.code.two_faces() { self.take_slot(face + 1) } else { left }]
+        let right = if of.code.two_faces() { self.take_slot(face + 1) } else { NONE };
+        if let Some(r) = self.shelf.record_mut(of.split) {
+            r.slots = [left, right];
+        }
+        [left, if right == NONE { left } else { right }]
     }
 
     fn leave_slots(&mut self, of: &Known, [left, right]: [u32; 2]) {
-        let face = self.shelf.head.first_face(of.split);
-        self.leave_slot(face, left);
+        self.leave_slot(left);
         if of.code.two_faces() {
-            self.leave_slot(face + 1, right);
+            self.leave_slot(right);
+        }
+        if let Some(r) = self.shelf.record_mut(of.split) {
+            r.slots = [NONE; 2];
         }
     }
 

@@ -45,6 +45,11 @@ impl List {
         self.of.get(at)
     }
 
+    /// The last ones, so many if there are.
+    pub(super) fn tail(&self, most: usize) -> &[Open] {
+        &self.of[self.of.len() - most.min(self.of.len())..]
+    }
+
     #[inline]
     pub(super) fn push(&mut self, open: Open, due: Due) {
         self.of.push(open);

@@ -40,12 +40,10 @@ impl<S: ByteRanges> PagedView<S> {
         self.shelf.position(node).ok()
     }
 
-    /// The vertices shown, ascending. O(vertices of the base and of resident pages).
+    /// The vertices shown, ascending. O(vertices shown, and splits of resident pages / 64).
     pub fn vertices(&self) -> impl Iterator<Item = u32> + '_ {
         let n0 = self.shelf.head.base_vertices;
-        let made = self.shelf.all().flat_map(move |p| {
-            (n0 + p.first..).zip(&p.node).filter(|(_, node)| **node != NONE).map(|(v, _)| v)
-        });
+        let made = self.shelf.all().flat_map(move |p| p.vertices().map(move |i| n0 + i));
         (0..n0).chain(made)
     }
 
@@ -119,7 +117,7 @@ impl<S: ByteRanges> PagedView<S> {
             for w in used {
                 let (row, present) = self.shelf.row(self.shelf.wedge_row(w));
                 let zeros = vec![0.0; width];
-                let new = wedges.push(if row.len() == width { row } else { &zeros }, present);
+                let new = wedges.push(if row.len() == width { &row } else { &zeros }, present);
                 numbers.insert(w, if present == 0 { NONE } else { new });
             }
             wedges.corner = corners().map(|w| numbers.get(&w).copied().unwrap_or(NONE)).collect();

@@ -1,11 +1,11 @@
 //! Chunks of splits as they are held, and the base.
 
 use crate::aif::{NONE, Positions};
-use crate::format::pages::{BaseLinks, Links};
+use crate::format::pages::{self, BaseLinks, Links};
 use crate::format::{MeshHead, SplitBlock};
 use crate::hierarchy::{Packed, SplitRows};
 use crate::progressive::{ProgressiveMesh, SplitCode, SplitKind};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// Where a row of attributes is: the page, or [`NONE`] for the base, and its number there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,23 +73,51 @@ pub(super) const LED: u8 = 4;
 /// After the last step of a geomorph by time it was applied and not asked for.
 pub(super) const LINGERED: u8 = 8;
 
+/// A split: what the file says of it, and what has become of it. What is asked of a split is asked together, far from what was asked before: so it lies together, and memory is waited for once.
+#[derive(Clone, Debug)]
+pub(super) struct Record {
+    pub(super) vertex: u32,
+    /// Its cuts.
+    pub(super) left: u32,
+    pub(super) right: u32,
+    /// The node that it replaces.
+    pub(super) parent: u32,
+    /// The split that replaces each of both nodes that it makes; [`NONE`] for a leaf.
+    pub(super) next: [u32; 2],
+    pub(super) bounds: Packed,
+    /// Where its new vertex stands, if places are single.
+    place: [f32; 3],
+    /// The node that its vertex is at; [`NONE`] if it is not in the mesh.
+    pub(super) node: u32,
+    /// The slots of its faces; [`NONE`] for none.
+    pub(super) slots: [u32; 2],
+    /// Where its nodes are in the list of what can be applied, and where it is in that of what can be undone.
+    pub(super) open_place: [u32; 2],
+    pub(super) last_place: u32,
+    pub(super) code: SplitCode,
+    pub(super) flags: u8,
+    /// Splits asked for that depend on it.
+    pub(super) dependents: u8,
+    /// With geomorphs by time: applied splits that do.
+    pub(super) holders: u8,
+}
+
 /// A chunk of splits, with what is applied of it.
 #[derive(Debug)]
 pub(super) struct Page {
     pub(super) first: u32,
     pub(super) first_face: u32,
     pub(super) first_wedge: u32,
-    pub(super) vertex: Vec<u32>,
-    pub(super) left: Vec<u32>,
-    pub(super) right: Vec<u32>,
-    pub(super) code: Vec<SplitCode>,
-    pub(super) new_positions: Positions,
-    pub(super) moved_positions: Positions,
+    pub(super) of: Vec<Record>,
+    /// Of which splits the new vertices are in the mesh, a bit each: so that those are found without reading the others.
+    there: Vec<u64>,
+    /// Where new vertices stand, if places are double.
+    places: Vec<[f64; 3]>,
+    moved_positions: Positions,
     /// Moved vertices before every 64th split.
     moved_before: Vec<u32>,
-    pub(super) links: Links,
-    /// Bounds of the splits.
-    pub(super) own: Vec<Packed>,
+    /// Splits of later chunks that replace nodes made here, ascending, and their bounds.
+    pub(super) outside: Vec<(u32, Packed)>,
     pub(super) rows: Vec<f32>,
     pub(super) present: Vec<u64>,
     pub(super) explicit: Vec<u32>,
@@ -98,17 +126,6 @@ pub(super) struct Page {
     pub(super) material: Vec<u32>,
     pub(super) group: Vec<u32>,
     // What is applied.
-    pub(super) flags: Vec<u8>,
-    /// Splits asked for that depend on each.
-    pub(super) dependents: Vec<u8>,
-    /// With geomorphs by time: applied splits that do.
-    pub(super) holders: Vec<u8>,
-    pub(super) last_place: Vec<u32>,
-    pub(super) open_place: Vec<[u32; 2]>,
-    /// The node that each vertex made here is at; [`NONE`] if it is not in the mesh.
-    pub(super) node: Vec<u32>,
-    /// The slot of each face made here.
-    pub(super) slot: Vec<u32>,
     pub(super) wedge_vertex: Vec<u32>,
     pub(super) wedge_row: Vec<RowRef>,
     /// Of a row that changes a wedge, the one before.
@@ -166,6 +183,30 @@ impl Page {
             }
             p
         };
+        if [links.parent.len(), links.next.len(), own.len()] != [count; 3] {
+            return None;
+        }
+        let of = (0..count).map(|k| Record {
+            vertex: block.splits.vertex[k],
+            left: block.splits.left[k],
+            right: block.splits.right[k],
+            parent: links.parent[k],
+            next: links.next[k],
+            bounds: own[k],
+            place: match &block.new_positions {
+                Positions::F32(p) => p[k],
+                Positions::F64(_) => [0.0; 3],
+            },
+            node: NONE,
+            slots: [NONE; 2],
+            open_place: [NONE; 2],
+            last_place: NONE,
+            code: block.splits.code[k],
+            flags: 0,
+            dependents: 0,
+            holders: 0,
+        });
+        let of = of.collect();
         fn shrink<T>(mut v: Vec<T>) -> Vec<T> {
             v.shrink_to_fit();
             v
@@ -174,32 +215,21 @@ impl Page {
             first: block.first,
             first_face: block.first_face,
             first_wedge: block.first_wedge,
-            vertex: shrink(block.splits.vertex),
-            left: shrink(block.splits.left),
-            right: shrink(block.splits.right),
-            code: shrink(block.splits.code),
-            new_positions: fit(block.new_positions),
+            of,
+            there: vec![0; count.div_ceil(64)],
+            places: match block.new_positions {
+                Positions::F32(_) => Vec::new(),
+                Positions::F64(p) => shrink(p),
+            },
             moved_positions: fit(block.moved_positions),
             moved_before,
-            links: Links {
-                parent: shrink(links.parent),
-                next: shrink(links.next),
-                outside: shrink(links.outside),
-            },
-            own: shrink(own),
+            outside: shrink(links.outside),
             rows: shrink(block.rows),
             present: shrink(block.present),
             explicit: shrink(block.explicit),
             split_rows,
             material: shrink(block.face_material),
             group: shrink(block.face_group),
-            flags: vec![0; count],
-            dependents: vec![0; count],
-            holders: vec![0; count],
-            last_place: vec![NONE; count],
-            open_place: vec![[NONE; 2]; count],
-            node: vec![NONE; count],
-            slot: vec![NONE; faces],
             wedge_vertex: vec![NONE; wedges],
             wedge_row: vec![RowRef::NOTHING; wedges],
             row_before: vec![RowRef::NOTHING; rows],
@@ -213,19 +243,49 @@ impl Page {
     /// Sets or clears flags of split `k` of the page.
     #[inline]
     pub(super) fn set(&mut self, k: usize, flags: u8, on: bool) {
-        let was = self.flags[k];
+        let was = self.of[k].flags;
         let is = if on { was | flags } else { was & !flags };
-        self.flags[k] = is;
+        self.of[k].flags = is;
         let used = |f: u8| (f & (APPLIED | LED) != 0) as usize;
         self.in_use = self.in_use + used(is) - used(was);
+    }
+
+    /// The new vertex of split `k` of the page is at a node; [`NONE`]: not in the mesh.
+    #[inline]
+    pub(super) fn set_node(&mut self, k: usize, node: u32) {
+        self.of[k].node = node;
+        let (word, bit) = (&mut self.there[k / 64], 1 << (k % 64));
+        *word = if node == NONE { *word & !bit } else { *word | bit };
+    }
+
+    /// The vertices made here that are in the mesh, by the splits that make them, ascending.
+    pub(super) fn vertices(&self) -> impl Iterator<Item = u32> + '_ {
+        let from = self.first;
+        self.there.iter().zip((from..).step_by(64)).filter(|(w, _)| **w != 0).flat_map(|(&word, from)| {
+            let mut left = word;
+            std::iter::from_fn(move || {
+                let bit = (left != 0).then(|| left.trailing_zeros())?;
+                left &= left - 1;
+                Some(from + bit)
+            })
+        })
+    }
+
+    /// Where the new vertex of split `k` of the page stands.
+    #[inline]
+    pub(super) fn place(&self, k: usize) -> DVec3 {
+        match self.places.get(k) {
+            Some(&p) => DVec3::from_array(p),
+            None => Vec3::from_array(self.of[k].place).as_dvec3(),
+        }
     }
 
     /// Where split `k` of the page puts the vertex that it splits, if it moves it.
     #[inline]
     pub(super) fn moved(&self, k: usize) -> Option<DVec3> {
-        self.code[k].moves().then(|| {
+        self.of[k].code.moves().then(|| {
             let from = k / 64 * 64;
-            let before = self.code[from..k].iter().filter(|c| c.moves()).count();
+            let before = self.of[from..k].iter().filter(|r| r.code.moves()).count();
             self.moved_positions.get(self.moved_before[k / 64] as usize + before)
         })
     }
@@ -239,45 +299,35 @@ impl Page {
             Positions::F32(v) => of(v),
             Positions::F64(v) => of(v),
         };
-        let l = &self.links;
-        of(&self.vertex)
-            + of(&self.left)
-            + of(&self.right)
-            + of(&self.code)
-            + points(&self.new_positions)
+        of(&self.of)
+            + of(&self.there)
+            + of(&self.places)
             + points(&self.moved_positions)
             + of(&self.moved_before)
-            + of(&l.parent)
-            + of(&l.next)
-            + of(&l.outside)
-            + of(&self.own)
+            + of(&self.outside)
             + of(&self.rows)
             + of(&self.present)
             + of(&self.explicit)
             + of(&self.split_rows)
             + of(&self.material)
             + of(&self.group)
-            + of(&self.flags)
-            + of(&self.dependents)
-            + of(&self.holders)
-            + of(&self.last_place)
-            + of(&self.open_place)
-            + of(&self.node)
-            + of(&self.slot)
             + of(&self.wedge_vertex)
             + of(&self.wedge_row)
             + of(&self.row_before)
             + size_of::<Self>()
     }
 
-    /// The most that a page can take, told by the directory: what its chunks say of themselves (`raw`), and the counts.
-    pub(super) fn most_bytes(raw: u64, page_raw: u64, count: u32, faces: u32, wedges: u32) -> usize {
-        let (count, faces, wedges) = (count as u64, faces as u64, wedges as u64);
-        let links = page_raw + size_of::<Packed>() as u64 * count;
-        // Rows are at least 8 bytes of `raw` each, and need as many for what they were before.
-        let attributes = 12 * count * (wedges > 0) as u64 + 12 * wedges + raw.saturating_sub(30 * count);
-        let state = (1 + 1 + 1 + 4 + 8 + 4) * count + 4 * faces + count.div_ceil(64) * 4;
-        usize::try_from(raw + links + attributes + state).unwrap_or(usize::MAX / 4) + size_of::<Page>() + 64
+    /// The most that a page can take, told by the directory: what its chunks say of themselves (`raw`), and the counts; `point`: bytes of a place.
+    pub(super) fn most_bytes(raw: u64, page_raw: u64, point: u64, count: u32, wedges: u32) -> usize {
+        let (count, wedges) = (count as u64, wedges as u64);
+        let outside = page_raw.saturating_sub(pages::SPLIT * count);
+        // Moved places, rows and what names faces; rows are at least 8 bytes each, and need as many for what they were before.
+        let others = raw.saturating_sub((18 + point) * count);
+        let attributes = 12 * count * (wedges > 0) as u64 + 12 * wedges + others;
+        let places = if point > 12 { point * count } else { 0 };
+        let records = size_of::<Record>() as u64 * count + count.div_ceil(64) * (4 + 8);
+        let all = outside + others + attributes + places + records;
+        usize::try_from(all).unwrap_or(usize::MAX / 4) + size_of::<Page>() + 64
     }
 }
 

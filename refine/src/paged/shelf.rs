@@ -1,18 +1,20 @@
 //! Which pages are there; fetching, and letting go.
 
 use super::PagedError;
-use super::page::{APPLIED, Base, LED, MARKED, Page, RowRef};
+use super::ahead::{Ahead, Made};
+use super::page::{APPLIED, Base, LED, MARKED, Page, Record, RowRef};
 use crate::aif::NONE;
 use crate::format::{
-    ByteRanges, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, Room, pages, read_piece,
-    read_piece_within,
+    ByteRanges, CONTRADICTS, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, Room, pages,
+    read_piece, read_piece_within,
 };
 use crate::hierarchy::Packed;
 use crate::progressive::{Damage, Fans, link_faces};
 use glam::{DVec3, Vec3};
+use std::borrow::Cow;
 use std::sync::Arc;
 
-/// What a view has read.
+/// What a view has read. Of pages made ahead by other threads those that were asked for in the end: so the same for any number of threads. Others were read in vain, and are not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Traffic {
@@ -49,7 +51,7 @@ struct ChunkAt {
 #[derive(Debug)]
 pub(super) struct Shelf<S> {
     reader: Arc<RangeReader<S>>,
-    pub(super) head: MeshHead,
+    pub(super) head: Arc<MeshHead>,
     pub(super) base: Base,
     chunks: Vec<ChunkAt>,
     /// The chunk that holds every 1024th split.
@@ -64,6 +66,50 @@ pub(super) struct Shelf<S> {
     pub(super) moves: bool,
     scratch: usize,
     pub(super) traffic: Traffic,
+    ahead: Ahead,
+    /// Counts frames.
+    frame: u64,
+    /// In this frame pages are made ahead.
+    pub(super) looks_ahead: bool,
+}
+
+/// What a page is made of, and with how much room.
+pub(super) struct OnWay {
+    chunk: Chunk,
+    bounds: Chunk,
+    beside: Chunk,
+    room: Room,
+}
+
+/// Fetches and decodes a page.
+///
+/// Errors: damage, which too little room cannot be told from; the source's.
+pub(super) fn read_page(source: &(impl ByteRanges + ?Sized), head: &MeshHead, way: &OnWay) -> Made {
+    let OnWay { chunk, bounds, beside, room } = way;
+    // One range: they stand side by side.
+    let bytes = source.fetch(chunk.offset..beside.range().end).map_err(FormatError::from)?;
+    let part = |c: &Chunk| {
+        let end = (c.range().end - chunk.offset).min(bytes.len() as u64) as usize;
+        &bytes[((c.offset - chunk.offset) as usize).min(end)..end]
+    };
+    let block = match read_piece_within(chunk, Some(head), part(chunk), *room)? {
+        Piece::Splits(block) => block,
+        _ => return Err(chunk.damage("it is no chunk of splits").into()),
+    };
+    let own = match read_piece(bounds, None, part(bounds))? {
+        Piece::Bounds(own) => own.of,
+        _ => return Err(bounds.damage("it holds no bounds").into()),
+    };
+    beside.check(part(beside))?;
+    let damaged = |c: &Chunk| c.damage(CONTRADICTS);
+    let known = (&block.splits.vertex[..], &own[..]);
+    let links =
+        pages::read(head, chunk.first, known, beside.raw, part(beside)).ok_or_else(|| damaged(beside))?;
+    if head.channels.is_some() && block.first_wedge != beside.first_face {
+        return Err(damaged(beside).into());
+    }
+    let page = Page::new(head, *block, own, links).ok_or_else(|| damaged(chunk))?;
+    Ok((page, bytes.len() as u64))
 }
 
 /// Splits between two entries of the index.
@@ -73,7 +119,10 @@ const STRIDE: usize = 1024;
 fn on_the_way(head: &MeshHead, [c, page]: [&Chunk; 2], room: Room) -> usize {
     let fetched = page.range().end.saturating_sub(c.offset);
     // One after the other, but what was read first is there.
-    let all = fetched.saturating_add(room.bytes(head, c)).saturating_add(pages::scratch(c.count, page.raw));
+    // And until the page is put together, what it is put together from is there.
+    let parts = (18 + 24 + pages::SPLIT + size_of::<Packed>() as u64) * c.count as u64;
+    let beside = pages::scratch(c.count, page.raw).max(parts);
+    let all = fetched.saturating_add(room.bytes(head, c)).saturating_add(beside);
     usize::try_from(all).unwrap_or(usize::MAX / 4)
 }
 
@@ -105,8 +154,8 @@ impl<S: ByteRanges> Shelf<S> {
         let (head, mut mesh) = reader.base(m)?;
         let bytes = reader.source().fetch(base_page.range()).map_err(FormatError::from)?;
         base_page.check(&bytes)?;
-        let links = pages::read_base(&head, base_page.raw, &bytes)
-            .ok_or_else(|| base_page.damage("its contents contradict each other"))?;
+        let links =
+            pages::read_base(&head, base_page.raw, &bytes).ok_or_else(|| base_page.damage(CONTRADICTS))?;
         traffic.requests += 2;
         traffic.bytes_read += base_chunk.stored + base_page.stored;
         traffic.bytes_touched = traffic.bytes_read;
@@ -146,7 +195,6 @@ impl<S: ByteRanges> Shelf<S> {
                     .checked_sub(p.first_face)
                     .ok_or_else(|| p.damage("its wedges do not follow those before"))?,
             };
-            let faces = head.first_face(c.first + c.count) - head.first_face(c.first);
             moves |= c.raw != c.count as u64 * (18 + point);
             scratch = scratch.max(on_the_way(&head, [&c, &p], Room::usual(c.count)));
             while index.len() * STRIDE < (c.first + c.count) as usize {
@@ -158,7 +206,7 @@ impl<S: ByteRanges> Shelf<S> {
                 first_face: head.first_face(c.first),
                 first_wedge: p.first_face,
                 singles: [c.first, c.first + c.count].map(|i| head.single.partition_point(|&s| s < i) as u32),
-                most: Page::most_bytes(c.raw, p.raw, c.count, faces, wedges),
+                most: Page::most_bytes(c.raw, p.raw, point, c.count, wedges),
                 touched: false,
             });
         }
@@ -172,13 +220,13 @@ impl<S: ByteRanges> Shelf<S> {
         let corners = std::mem::take(&mut mesh.base_faces);
         let wedges = head.base_wedges;
         if corners.iter().flatten().any(|&w| w >= wedges) {
-            return Err(base_chunk.damage("its contents contradict each other").into());
+            return Err(base_chunk.damage(CONTRADICTS).into());
         }
         let links_of_faces = link_faces(&faces, mesh.base_vertices());
         let base = Base::new(mesh, corners.len(), links);
         let pages = chunks.iter().map(|_| None).collect();
         let shelf = Shelf {
-            head,
+            head: Arc::new(head),
             base,
             chunks,
             index,
@@ -190,6 +238,9 @@ impl<S: ByteRanges> Shelf<S> {
             scratch,
             traffic,
             reader,
+            ahead: Ahead::new(None, 0, 0, 0),
+            frame: 0,
+            looks_ahead: false,
         };
         Ok((shelf, Fans { corners, links: links_of_faces }))
     }
@@ -206,6 +257,36 @@ impl<S: ByteRanges> Shelf<S> {
             + 8 * self.pages.capacity()
             + size_of::<Chunk>() * directory.chunks.capacity() / (directory.meshes as usize).max(1)
             + self.held
+            + self.ahead.bytes()
+    }
+
+    /// Of so many bytes that are free sets some aside for pages that are made ahead, if there are enough.
+    pub(super) fn set_aside(&mut self, free: usize) {
+        let most = self.chunks.iter().map(|c| c.most).max().unwrap_or(0);
+        self.ahead = Ahead::new(self.reader.source().shared(), free, most, self.scratch);
+    }
+
+    /// A frame begins.
+    pub(super) fn next_frame(&mut self) {
+        self.clock += 1;
+        self.frame += 1;
+        self.looks_ahead = self.ahead.works();
+    }
+
+    /// The page of split `i` is not there.
+    #[inline]
+    pub(super) fn is_missing(&self, i: u32) -> bool {
+        self.pages.get(self.chunk_of(i)).is_none_or(|p| p.is_none())
+    }
+
+    /// Has the page of split `i` made ahead if it is not there and there is room for it; says whether it is there, or will be.
+    pub(super) fn wish(&mut self, i: u32) -> bool {
+        let c = self.chunk_of(i);
+        if self.pages.get(c).is_none_or(|p| p.is_some()) {
+            return true;
+        }
+        let Ok(way) = self.way(i, false) else { return false };
+        self.ahead.wish(c, self.frame, &self.head, way)
     }
 
     pub(super) fn directory_bytes(&self) -> u64 {
@@ -221,9 +302,12 @@ impl<S: ByteRanges> Shelf<S> {
         self.resident
     }
 
-    /// The chunk of split `i`, which there is.
+    /// The chunk of split `i`; of none there is, one more than there are.
     #[inline]
     fn chunk_of(&self, i: u32) -> usize {
+        if i as usize >= self.head.splits as usize {
+            return self.chunks.len();
+        }
         let mut k = self.index.get(i as usize / STRIDE).map_or(0, |&k| k as usize);
         while self.chunks.get(k + 1).is_some_and(|c| c.first <= i) {
             k += 1;
@@ -243,10 +327,10 @@ impl<S: ByteRanges> Shelf<S> {
         Some(c)
     }
 
-    /// The split that makes face `f`, which there is; [`NONE`] of the base's. Most chunks have no splits that make one face only, or few.
+    /// The split that makes face `f`, which there is, and which of its two that is; [`NONE`] of the base's. Most chunks have no splits that make one face only, or few.
     #[inline]
-    fn maker_of_face(&self, f: u32) -> u32 {
-        let Some(c) = self.chunk_of_face(f) else { return NONE };
+    fn half_of_face(&self, f: u32) -> (u32, usize) {
+        let Some(c) = self.chunk_of_face(f) else { return (NONE, 0) };
         let k = f - self.head.base_faces;
         let [from, to] = self.chunks.get(c).map_or([0; 2], |c| c.singles.map(|s| s as usize));
         let singles = self.head.single.get(from..to).unwrap_or_default();
@@ -256,7 +340,9 @@ impl<S: ByteRanges> Shelf<S> {
             let mid = (low + high) / 2;
             if 2 * singles[mid] - ((from + mid) as u32) < k { low = mid + 1 } else { high = mid }
         }
-        (k + (from + low) as u32) / 2
+        // As if all made two.
+        let k = k + (from + low) as u32;
+        (k / 2, (k % 2) as usize)
     }
 
     /// The page of split `i` if it is there, and the split's place in it.
@@ -264,7 +350,18 @@ impl<S: ByteRanges> Shelf<S> {
     pub(super) fn page(&self, i: u32) -> Option<(&Page, usize)> {
         let page = self.pages.get(self.chunk_of(i))?.as_deref()?;
         let k = i.wrapping_sub(page.first) as usize;
-        (k < page.vertex.len()).then_some((page, k))
+        (k < page.of.len()).then_some((page, k))
+    }
+
+    /// Split `i`, if its page is there.
+    #[inline]
+    pub(super) fn record(&self, i: u32) -> Option<&Record> {
+        self.page(i).map(|(p, k)| &p.of[k])
+    }
+
+    #[inline]
+    pub(super) fn record_mut(&mut self, i: u32) -> Option<&mut Record> {
+        self.page_mut(i).map(|(p, k)| &mut p.of[k])
     }
 
     #[inline]
@@ -272,7 +369,7 @@ impl<S: ByteRanges> Shelf<S> {
         let c = self.chunk_of(i);
         let page = self.pages.get_mut(c)?.as_deref_mut()?;
         let k = i.wrapping_sub(page.first) as usize;
-        (k < page.vertex.len()).then_some((page, k))
+        (k < page.of.len()).then_some((page, k))
     }
 
     /// Chunks of splits.
@@ -283,12 +380,12 @@ impl<S: ByteRanges> Shelf<S> {
     /// The first split of a chunk, and how many it has if its page is there; else none.
     pub(super) fn resident_run(&self, chunk: usize) -> (u32, u32) {
         let page = self.pages.get(chunk).and_then(|p| p.as_deref());
-        page.map_or((0, 0), |p| (p.first, p.vertex.len() as u32))
+        page.map_or((0, 0), |p| (p.first, p.of.len() as u32))
     }
 
     /// The flags of split `i`; none if its page is not there.
     pub(super) fn flags(&self, i: u32) -> u8 {
-        self.page(i).map_or(0, |(p, k)| p.flags[k])
+        self.page(i).map_or(0, |(p, k)| p.of[k].flags)
     }
 
     /// What it takes to have the page of split `i`. Notes that it is in use.
@@ -318,44 +415,27 @@ impl<S: ByteRanges> Shelf<S> {
         Ok(on_the_way(&self.head, [&chunk, &beside], Room::ANY).saturating_sub(self.scratch))
     }
 
-    /// Fetches and decodes the page of split `i`, taking on the way as much as [`Shelf::most_at_once`] says; `all`: whatever it takes ([`Shelf::most_beyond`]).
+    /// What the page of split `i` is made of.
+    fn way(&self, i: u32, all: bool) -> Result<OnWay, PagedError> {
+        let [chunk, bounds, beside] = self.entries(i)?;
+        let room = if all { Room::ANY } else { Room::usual(chunk.count) };
+        Ok(OnWay { chunk, bounds, beside, room })
+    }
+
+    /// Fetches and decodes the page of split `i`, taking on the way as much as [`Shelf::most_at_once`] says; `all`: whatever it takes ([`Shelf::most_beyond`]). Pages that were made ahead are taken as they are.
     ///
     /// Errors: damage, which too little room cannot be told from; the source's.
     pub(super) fn fetch(&mut self, i: u32, all: bool) -> Result<(), PagedError> {
-        let at = self.chunk_of(i);
-        let [chunk, bounds, beside] = self.entries(i)?;
-        let room = if all { Room::ANY } else { Room::usual(chunk.count) };
-        // One range: they stand side by side.
-        let bytes =
-            self.reader.source().fetch(chunk.offset..beside.range().end).map_err(FormatError::from)?;
+        let (at, way) = (self.chunk_of(i), self.way(i, all)?);
         self.traffic.requests += 1;
-        self.traffic.bytes_read += bytes.len() as u64;
-        let part = |c: &Chunk| {
-            let end = (c.range().end - chunk.offset).min(bytes.len() as u64) as usize;
-            &bytes[((c.offset - chunk.offset) as usize).min(end)..end]
-        };
-        let block = read_piece_within(&chunk, Some(&self.head), part(&chunk), room);
+        self.traffic.bytes_read += way.beside.range().end.saturating_sub(way.chunk.offset);
+        let made = self.ahead.take(at).filter(|_| !all);
+        let made = made.unwrap_or_else(|| read_page(self.reader.source(), &self.head, &way));
         if all {
             // What has grown beyond what is set aside is not kept.
             self.head.start.forget();
         }
-        let block = match block? {
-            Piece::Splits(block) => block,
-            _ => return Err(chunk.damage("it is no chunk of splits").into()),
-        };
-        let own = match read_piece(&bounds, None, part(&bounds))? {
-            Piece::Bounds(own) => own.of,
-            _ => return Err(bounds.damage("it holds no bounds").into()),
-        };
-        beside.check(part(&beside))?;
-        let damaged = |c: &Chunk| c.damage("its contents contradict each other");
-        let known = (&block.splits.vertex[..], &own[..]);
-        let links = pages::read(&self.head, chunk.first, known, beside.raw, part(&beside))
-            .ok_or_else(|| damaged(&beside))?;
-        if self.head.channels.is_some() && block.first_wedge != beside.first_face {
-            return Err(damaged(&beside).into());
-        }
-        let mut page = Page::new(&self.head, *block, own, links).ok_or_else(|| damaged(&chunk))?;
+        let (mut page, bytes) = made?;
         page.stamp = self.clock;
         self.held += page.bytes();
         self.resident += 1;
@@ -363,7 +443,7 @@ impl<S: ByteRanges> Shelf<S> {
         if let Some(c) = self.chunks.get_mut(at).filter(|c| !c.touched) {
             c.touched = true;
             self.traffic.chunks_touched += 1;
-            self.traffic.bytes_touched += bytes.len() as u64;
+            self.traffic.bytes_touched += bytes;
         }
         self.pages[at] = Some(Box::new(page));
         Ok(())
@@ -393,41 +473,50 @@ impl<S: ByteRanges> Shelf<S> {
 
     #[inline]
     pub(super) fn is_applied(&self, i: u32) -> bool {
-        self.page(i).is_some_and(|(p, k)| p.flags[k] & APPLIED != 0)
+        self.page(i).is_some_and(|(p, k)| p.of[k].flags & APPLIED != 0)
     }
 
     /// Split `i` is asked for.
     #[inline]
     pub(super) fn is_led(&self, i: u32) -> bool {
-        self.page(i).is_some_and(|(p, k)| p.flags[k] & LED != 0)
+        self.page(i).is_some_and(|(p, k)| p.of[k].flags & LED != 0)
     }
 
     /// Marks split `i` as gathered, or not, if its page is there.
     pub(super) fn mark(&mut self, i: u32, on: bool) {
         if let Some((p, k)) = self.page_mut(i) {
-            p.flags[k] = if on { p.flags[k] | MARKED } else { p.flags[k] & !MARKED };
+            let flags = &mut p.of[k].flags;
+            *flags = if on { *flags | MARKED } else { *flags & !MARKED };
         }
     }
 
     #[inline]
     pub(super) fn is_marked(&self, i: u32) -> bool {
-        self.page(i).is_some_and(|(p, k)| p.flags[k] & MARKED != 0)
+        self.page(i).is_some_and(|(p, k)| p.of[k].flags & MARKED != 0)
     }
 
     /// The node that split `i` replaces, and its vertex; `None` if its page is not there.
     #[inline]
     pub(super) fn parent(&self, i: u32) -> Option<(u32, u32)> {
-        self.page(i).map(|(p, k)| (p.links.parent[k], p.vertex[k]))
+        self.record(i).map(|r| (r.parent, r.vertex))
     }
 
     /// What split `i` depends on; [`NONE`] for the base.
     #[inline]
     pub(super) fn needs(&self, i: u32) -> Option<[u32; 3]> {
-        let (p, k) = self.page(i)?;
-        let maker = |cut: u32| {
-            if cut == NONE { NONE } else { self.maker_of_face(cut >> 2) }
-        };
-        Some([self.maker(p.links.parent[k]), maker(p.left[k]), maker(p.right[k])])
+        self.record(i).map(|r| self.needs_of(r))
+    }
+
+    /// What a split depends on.
+    #[inline]
+    pub(super) fn needs_of(&self, r: &Record) -> [u32; 3] {
+        [self.maker(r.parent), self.half_of_cut(r.left).0, self.half_of_cut(r.right).0]
+    }
+
+    /// The split that makes the face of a cut, and which of its two that is; [`NONE`] of the base's, and of none.
+    #[inline]
+    pub(super) fn half_of_cut(&self, cut: u32) -> (u32, usize) {
+        if cut == NONE { (NONE, 0) } else { self.half_of_face(cut >> 2) }
     }
 
     /// The split that made a node; [`NONE`] for the base's.
@@ -450,19 +539,19 @@ impl<S: ByteRanges> Shelf<S> {
             return (next, base.bounds[node as usize]);
         }
         let Some((p, k, side)) = self.at_node(node) else { return (NONE, Packed::default()) };
-        let next = p.links.next[k][side];
+        let next = p.of[k].next[side];
         if next == NONE {
             return (NONE, Packed::default());
         }
-        if let Some(&own) = p.own.get(next.wrapping_sub(p.first) as usize) {
-            return (next, own);
+        if let Some(own) = p.of.get(next.wrapping_sub(p.first) as usize) {
+            return (next, own.bounds);
         }
         // Its page says the same: that is there mostly, and found sooner.
-        if let Some((there, k)) = self.page(next) {
-            return (next, there.own[k]);
+        if let Some(there) = self.record(next) {
+            return (next, there.bounds);
         }
-        match p.links.outside.binary_search_by_key(&next, |o| o.0) {
-            Ok(at) => (next, p.links.outside[at].1),
+        match p.outside.binary_search_by_key(&next, |o| o.0) {
+            Ok(at) => (next, p.outside[at].1),
             Err(_) => (NONE, Packed::default()),
         }
     }
@@ -471,7 +560,7 @@ impl<S: ByteRanges> Shelf<S> {
     pub(super) fn open_place(&self, node: u32) -> u32 {
         match self.base.open_place.get(node as usize) {
             Some(&place) => place,
-            None => self.at_node(node).map_or(NONE, |(p, k, side)| p.open_place[k][side]),
+            None => self.at_node(node).map_or(NONE, |(p, k, side)| p.of[k].open_place[side]),
         }
     }
 
@@ -483,19 +572,19 @@ impl<S: ByteRanges> Shelf<S> {
         }
         let j = node - self.head.base_vertices;
         if let Some((p, k)) = self.page_mut(j >> 1) {
-            p.open_place[k][(j & 1) as usize] = place;
+            p.of[k].open_place[(j & 1) as usize] = place;
         }
     }
 
     #[inline]
     pub(super) fn last_place(&self, i: u32) -> u32 {
-        self.page(i).map_or(NONE, |(p, k)| p.last_place[k])
+        self.record(i).map_or(NONE, |r| r.last_place)
     }
 
     #[inline]
     pub(super) fn set_last_place(&mut self, i: u32, place: u32) {
         if let Some((p, k)) = self.page_mut(i) {
-            p.last_place[k] = place;
+            p.of[k].last_place = place;
         }
     }
 
@@ -504,7 +593,7 @@ impl<S: ByteRanges> Shelf<S> {
     pub(super) fn node(&self, v: u32) -> u32 {
         match v.checked_sub(self.head.base_vertices) {
             None => self.base.node[v as usize],
-            Some(i) => self.page(i).map_or(NONE, |(p, k)| p.node[k]),
+            Some(i) => self.record(i).map_or(NONE, |r| r.node),
         }
     }
 
@@ -514,7 +603,7 @@ impl<S: ByteRanges> Shelf<S> {
             None => self.base.node[v as usize] = node,
             Some(i) => {
                 if let Some((p, k)) = self.page_mut(i) {
-                    p.node[k] = node;
+                    p.set_node(k, node);
                 }
             }
         }
@@ -523,23 +612,9 @@ impl<S: ByteRanges> Shelf<S> {
     /// The slot of face `f`; [`NONE`] if it is not in the mesh.
     #[inline]
     pub(super) fn slot_of(&self, f: u32) -> u32 {
-        match self.chunk_of_face(f) {
-            None => self.base.slot.get(f as usize).copied().unwrap_or(NONE),
-            Some(c) => {
-                self.pages.get(c).and_then(|p| p.as_deref()).map_or(NONE, |p| {
-                    p.slot.get(f.wrapping_sub(p.first_face) as usize).copied().unwrap_or(NONE)
-                })
-            }
-        }
-    }
-
-    #[inline]
-    pub(super) fn set_slot(&mut self, f: u32, slot: u32) {
-        if let Some(c) = self.chunk_of_face(f)
-            && let Some(p) = self.pages.get_mut(c).and_then(|p| p.as_deref_mut())
-            && let Some(s) = p.slot.get_mut(f.wrapping_sub(p.first_face) as usize)
-        {
-            *s = slot;
+        match self.half_of_face(f) {
+            (NONE, _) => self.base.slot.get(f as usize).copied().unwrap_or(NONE),
+            (i, side) => self.record(i).map_or(NONE, |r| r.slots[side]),
         }
     }
 
@@ -604,19 +679,21 @@ impl<S: ByteRanges> Shelf<S> {
     }
 
     /// The values of a row, and the channels it has.
-    pub(super) fn row(&self, r: RowRef) -> (&[f32], u64) {
+    pub(super) fn row(&self, r: RowRef) -> (Cow<'_, [f32]>, u64) {
         let stride: usize = self.head.channels.iter().flatten().map(|c| c.width).sum();
         let at = r.row as usize;
-        let (rows, present) = match self.pages.get(r.page as usize).and_then(|p| p.as_deref()) {
-            Some(p) => (&p.rows[..], p.present.get(at).copied()),
+        let nothing = (Cow::Borrowed(&[][..]), 0);
+        match self.pages.get(r.page as usize).and_then(|p| p.as_deref()) {
+            Some(p) => {
+                let values = p.rows.get(at.saturating_mul(stride)..(at + 1).saturating_mul(stride));
+                values.zip(p.present.get(at)).map_or(nothing, |(v, &present)| (v.into(), present))
+            }
             None => match &self.base.mesh.wedges {
-                Some(w) if r.page == NONE => (&w.rows[..], w.present.get(at)),
-                _ => return (&[], 0),
+                Some(w) if r.page == NONE => {
+                    w.present.get(at).map_or(nothing, |present| (w.rows.row(at, w.stride), present))
+                }
+                _ => nothing,
             },
-        };
-        match (rows.get(at.saturating_mul(stride)..(at + 1).saturating_mul(stride)), present) {
-            (Some(values), Some(present)) => (values, present),
-            _ => (&[], 0),
         }
     }
 
@@ -631,14 +708,14 @@ impl<S: ByteRanges> Shelf<S> {
             let i = at >> 1;
             let Some((p, local)) = self.page(i) else { return Err(Damage::Fan(i as usize).into()) };
             if at & 1 == 1 {
-                return Ok(p.new_positions.get(local));
+                return Ok(p.place(local));
             }
             if !self.moves {
                 // It stands where its vertex always does.
-                return match p.vertex[local].checked_sub(n0) {
-                    None => Ok(self.base.mesh.base_positions.get(p.vertex[local] as usize)),
+                return match p.of[local].vertex.checked_sub(n0) {
+                    None => Ok(self.base.mesh.base_positions.get(p.of[local].vertex as usize)),
                     Some(j) => match self.page(j) {
-                        Some((p, local)) => Ok(p.new_positions.get(local)),
+                        Some((p, local)) => Ok(p.place(local)),
                         None => Err(Damage::Fan(i as usize).into()),
                     },
                 };
@@ -646,7 +723,7 @@ impl<S: ByteRanges> Shelf<S> {
             if let Some(to) = p.moved(local) {
                 return Ok(to);
             }
-            k = p.links.parent[local];
+            k = p.of[local].parent;
         }
     }
 

@@ -31,7 +31,7 @@ impl<S: ByteRanges> PagedView<S> {
         self.motions = frames.map(Motions::new);
         if begins {
             // What is drawn is what is asked for.
-            self.shelf.all_mut().for_each(|p| p.holders.copy_from_slice(&p.dependents));
+            self.shelf.all_mut().flat_map(|p| &mut p.of).for_each(|r| r.holders = r.dependents);
         }
         Ok(())
     }
@@ -104,7 +104,7 @@ impl<S: ByteRanges> PagedView<S> {
     fn stepped(&mut self) {
         for p in self.shelf.all_mut().filter(|p| p.turned || p.lingered > 0) {
             p.lingered = 0;
-            for f in &mut p.flags {
+            for f in p.of.iter_mut().map(|r| &mut r.flags) {
                 let lingers = *f & (APPLIED | LED) == APPLIED;
                 *f = if lingers { *f | LINGERED } else { *f & !LINGERED };
                 p.lingered += usize::from(lingers);
@@ -139,7 +139,7 @@ impl<S> Shelf<S> {
     {
         let mut out = Vec::new();
         for p in self.all().filter(|p| pages(p)) {
-            out.extend((p.first..).zip(&p.flags).filter(|(_, f)| of(**f)).map(|(i, _)| i));
+            out.extend((p.first..).zip(&p.of).filter(|(_, r)| of(r.flags)).map(|(i, _)| i));
         }
         out
     }
@@ -179,7 +179,7 @@ impl<S: ByteRanges> Cut for PagedView<S> {
     }
 
     fn entry(&self, i: u32) -> Entry {
-        let bounds = self.shelf.page(i).map_or_else(Default::default, |(p, k)| p.own[k]);
+        let bounds = self.shelf.record(i).map_or_else(Default::default, |r| r.bounds);
         let centre = self.shelf.local_centre(self.parent(i).0);
         Entry::new(i, centre.unwrap_or_default(), bounds)
     }
@@ -209,7 +209,7 @@ impl<S: ByteRanges> Stage for PagedView<S> {
     }
 
     fn is_free(&self, i: u32) -> bool {
-        self.shelf.page(i).is_some_and(|(p, k)| p.flags[k] & APPLIED != 0 && p.holders[k] == 0)
+        self.shelf.record(i).is_some_and(|r| r.flags & APPLIED != 0 && r.holders == 0)
     }
 
     fn draw(&mut self, i: u32) -> Result<(), PagedError> {

@@ -24,7 +24,7 @@ impl WedgeState {
         let base = streams.base_vertex.len();
         WedgeState {
             vertex: streams.base_vertex.clone(),
-            rows: streams.rows[..base * streams.stride].to_vec(),
+            rows: (0..base).flat_map(|r| streams.rows.row(r, streams.stride).into_owned()).collect(),
             present: streams.present.iter().take(base).collect(),
             undo_rows: Vec::new(),
             undo_present: Vec::new(),
@@ -37,10 +37,11 @@ impl WedgeState {
     /// Adds wedges of vertex `v`, and gives `changed` their next values.
     pub(super) fn apply(&mut self, streams: &WedgeStreams, v: u32, new: usize, changed: &[u32]) {
         let stride = streams.stride;
-        let row = |r: usize| &streams.rows[r * stride..(r + 1) * stride];
         for _ in 0..new {
             self.vertex.push(v);
-            self.rows.extend_from_slice(row(self.next_row));
+            let end = self.rows.len();
+            self.rows.resize(end + stride, 0.0);
+            streams.rows.read(self.next_row, &mut self.rows[end..]);
             self.present.push(streams.present[self.next_row]);
             self.next_row += 1;
         }
@@ -48,7 +49,7 @@ impl WedgeState {
             let range = w as usize * stride..(w as usize + 1) * stride;
             self.undo_rows.extend_from_slice(&self.rows[range.clone()]);
             self.undo_present.push(self.present[w as usize]);
-            self.rows[range].copy_from_slice(row(self.next_row));
+            streams.rows.read(self.next_row, &mut self.rows[range]);
             self.present[w as usize] = streams.present[self.next_row];
             self.next_row += 1;
         }

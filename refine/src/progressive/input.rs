@@ -33,6 +33,9 @@ pub struct Polygons {
     pub corners: Vec<u32>,
 }
 
+/// A corner at full detail, as (face slot, corner), and the wedge of the input that it has there.
+pub(crate) type Correction = (usize, usize, u32);
+
 impl InputOrder {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
@@ -92,6 +95,15 @@ impl InputOrder {
     pub(super) fn note_wedges(&mut self, full: &Wedges, slot: &[u32], input: &Wedges) {
         const UNSEEN: u32 = NONE - 1;
         let slots = slot.iter().filter(|s| **s != NONE).count();
+        if self.polygons.is_none()
+            && is_part_of(input, full)
+            && slot[..input.len()].iter().all(|s| *s != NONE)
+        {
+            // Nothing differs, but that the input has no wedges that were made to tell others apart: and then no corner has them.
+            self.wedge = vec![NONE; slots];
+            (0u32..).zip(&slot[..input.len()]).for_each(|(w, &s)| self.wedge[s as usize] = w);
+            return;
+        }
         let mut of_slot = vec![UNSEEN; slots];
         let mut source = vec![NONE; input.len()];
         let mut others = Vec::new();
@@ -126,6 +138,15 @@ impl InputOrder {
             }
         }
     }
+}
+
+/// All wedges of `part` are those of `all`, bit for bit, and at the same corners.
+fn is_part_of(part: &Wedges, all: &Wedges) -> bool {
+    let same = |w: u32| {
+        part.present(w) == all.present(w)
+            && part.row(w).iter().zip(all.row(w)).all(|(a, b)| a.to_bits() == b.to_bits())
+    };
+    part.len() <= all.len() && part.corner == all.corner && (0..part.len() as u32).all(same)
 }
 
 fn same_wedge(a: &MeshInput, x: u32, b: &MeshInput, y: u32) -> bool {
@@ -199,6 +220,28 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
             of.extend(std::iter::repeat_n(k, (n.saturating_sub(2) as usize).min(room)));
         }
         faces.iter().map(|&f| of.get(f as usize).copied()).collect()
+    }
+
+    /// At full detail: the corners (face slot, corner) that have other attributes in the input than splits bring, each with its wedge there; and the input's wedges. Splits leave out the sign of a zero, and
+    /// where wedges end that were one. O(n).
+    pub(crate) fn corrections(&self) -> Option<(Wedges, Vec<Correction>)> {
+        let pm = self.source();
+        let order = pm.order.as_ref().filter(|o| o.fits(pm) && self.position() == pm.splits.len())?;
+        if order.rows.is_empty() && order.corner_wedges.is_empty() {
+            return None;
+        }
+        let wedges = self.input_wedges(order, self.to_input().wedges.as_ref()?)?;
+        let same = |s: u32, w: u32| match w {
+            NONE => self.present(s) == 0,
+            _ => {
+                self.present(s) == wedges.present(w)
+                    && self.row(s).iter().zip(wedges.row(w)).all(|(a, b)| a.to_bits() == b.to_bits())
+            }
+        };
+        let corners = order.corner_slots().zip(&wedges.corner);
+        let others = corners.filter(|&((f, k), &w)| !same(self.indices()[f][k], w));
+        let others = others.map(|((f, k), &w)| (f, k, w)).collect();
+        Some((wedges, others))
     }
 
     /// The wedges of the input; `have` holds those of full detail, by slot.

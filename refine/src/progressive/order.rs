@@ -10,8 +10,8 @@
 //! come in the order of the file: orders by the l/r rule alone end in [`super::Damage`]. (Counted as splits of their tips' vertices too, all random
 //! orders of these files led to the same mesh.)
 
-use super::{ProgressiveMesh, SplitKind};
-use crate::aif::{NONE, Positions};
+use super::{Places, ProgressiveMesh, SplitKind, WedgeStreams};
+use crate::aif::NONE;
 use std::sync::Arc;
 
 /// The order asked for is none of all splits, or puts a split before one it depends on.
@@ -111,25 +111,36 @@ impl ProgressiveMesh {
         out.splits.left = order.iter().map(|i| cut(s.left[pick(i)])).collect();
         out.splits.right = order.iter().map(|i| cut(s.right[pick(i)])).collect();
         out.splits.code = order.iter().map(|i| s.code[pick(i)]).collect();
-        out.splits.error = order.iter().map(|i| s.error[pick(i)]).collect();
+        // There may be none.
+        out.splits.error = order.iter().filter_map(|i| s.error.get(pick(i)).copied()).collect();
         if let Some(streams) = &self.wedges {
-            let mut new = streams.clone();
-            new.rows.truncate(base_wedges as usize * streams.stride);
-            new.present.truncate(base_wedges as usize);
-            new.explicit.clear();
+            let base = base_wedges as usize;
+            let mut values = Vec::with_capacity(streams.rows.len());
+            let mut new = WedgeStreams {
+                channels: streams.channels.clone(),
+                stride: streams.stride,
+                base_vertex: streams.base_vertex.clone(),
+                ..Default::default()
+            };
+            let add = |values: &mut Vec<f32>, r: usize| {
+                let end = values.len();
+                values.resize(end + streams.stride, 0.0);
+                streams.rows.read(r, &mut values[end..]);
+            };
+            new.present.extend((0..base).map(|r| streams.present[r]));
+            (0..base).for_each(|r| add(&mut values, r));
             for &i in order {
                 let r = &rows[i as usize];
                 let range = r.first_row..r.first_row + (r.new + r.changed) as usize;
                 new.present.extend(range.clone().map(|r| streams.present[r]));
-                new.rows.extend_from_slice(
-                    &streams.rows[range.start * streams.stride..range.end * streams.stride],
-                );
+                range.for_each(|r| add(&mut values, r));
                 let entry = &streams.explicit[r.explicit.clone()];
                 if let Some((counts, ids)) = entry.split_at_checked(2) {
                     new.explicit.extend_from_slice(counts);
                     new.explicit.extend(ids.iter().map(|&w| new_wedge.get(w as usize).copied().unwrap_or(w)));
                 }
             }
+            new.rows = values.into();
             out.wedges = Some(new);
         }
         if let Some(order) = &self.order {
@@ -156,10 +167,11 @@ impl ProgressiveMesh {
         let mut keys: Vec<(u32, u32, u32)> = Vec::with_capacity(n);
         let mut levels = self.levels.iter().copied().peekable();
         let mut level = 0;
-        for (i, (on, &error)) in (0u32..).zip(self.dependencies().iter().zip(&self.splits.error)) {
+        for (i, (k, on)) in (0u32..).zip(self.dependencies().iter().enumerate()) {
             while levels.next_if(|&l| l <= i).is_some() {
                 level += 1;
             }
+            let error = self.splits.error.get(k).copied().unwrap_or(0.0);
             let falling = if error > 0.0 { !error.to_bits() } else { u32::MAX };
             let own = (level, falling, i.reverse_bits());
             let before = on.iter().filter_map(|&d| keys.get(d as usize).copied());
@@ -196,7 +208,7 @@ impl ProgressiveMesh {
         })
     }
 
-    fn moved_in_order(&self, order: &[u32]) -> Positions {
+    fn moved_in_order(&self, order: &[u32]) -> Places {
         let mut next = 0;
         let slots: Vec<u32> = self
             .splits

@@ -50,8 +50,20 @@ impl Presence {
     }
 
     /// Adds a row. O(kinds), as long as there are at most 256.
+    #[inline]
     pub fn push(&mut self, channels: u64) {
         self.len += 1;
+        // As nearly always.
+        if self.kinds.len() != 1 || self.kinds[0] != channels {
+            self.push_kind(channels);
+        } else if let Kinds::Bytes(of) = &mut self.of {
+            of.push(0);
+        }
+    }
+
+    /// As [`Presence::push`], counted already.
+    #[inline(never)]
+    fn push_kind(&mut self, channels: u64) {
         if let Kinds::Each(of) = &mut self.of {
             of.push(channels);
             return;

@@ -2,8 +2,8 @@
 
 use super::input::InputOrder;
 use super::links::next;
-use super::{ProgressiveMesh, SplitCode, WedgeStreams};
-use crate::aif::{FaceId, NONE, Topology, VertexId, Wedges};
+use super::{Presence, ProgressiveMesh, SplitCode, WedgeStreams, directions};
+use crate::aif::{FaceId, NONE, Semantic, Topology, VertexId, Wedges};
 use crate::simplify::{CollapseLog, LoggedWing};
 use std::ops::Range;
 
@@ -16,12 +16,15 @@ pub(super) struct WedgeReplay<'a> {
     slot: Vec<u32>,
     count: u32,
     out: WedgeStreams,
+    /// Rows of `out`.
+    values: Vec<f32>,
     /// (coarse, fine) wedges of the split at hand.
     pairs: Vec<(u32, u32)>,
     /// Wedges of which the split at hand changes the values.
     changed: Vec<u32>,
     /// Wedges that the split at hand makes, if it lists them.
     fresh: Vec<u32>,
+    between: Option<Between>,
     /// Where a seam ended two wedges became one: cursors, which tell corners by that alone, give all of them the first of the two.
     ambiguous: bool,
 }
@@ -40,17 +43,13 @@ impl<'a> WedgeReplay<'a> {
         log: &'a CollapseLog,
         t: &Topology,
         vertex: impl Fn(VertexId) -> u32,
+        coarse_normals: bool,
     ) -> Self {
         let stride = wedges.stride();
         // Every wedge is made once.
         let rows = wedges.len() + log.rows.len();
-        let mut out = WedgeStreams {
-            channels: wedges.channels().to_vec(),
-            stride,
-            rows: Vec::with_capacity(rows * stride),
-            present: super::Presence::default(),
-            ..Default::default()
-        };
+        let mut out = WedgeStreams { channels: wedges.channels().to_vec(), stride, ..Default::default() };
+        let mut values = Vec::with_capacity(rows * stride);
         let (mut slot, mut count) = (vec![NONE; wedges.len()], 0);
         for f in t.faces() {
             for (&w, v) in wedges.corner[t.corner_range(f)].iter().zip(t.triangle(f)) {
@@ -58,14 +57,27 @@ impl<'a> WedgeReplay<'a> {
                     slot[w as usize] = count;
                     count += 1;
                     out.base_vertex.push(0);
-                    out.rows.extend_from_slice(wedges.row(w));
+                    values.extend_from_slice(wedges.row(w));
                     out.present.push(wedges.present(w));
                 }
                 out.base_vertex[slot[w as usize] as usize] = vertex(v);
             }
         }
         let (pairs, changed, fresh) = Default::default();
-        WedgeReplay { log, wedges, slot, count, out, pairs, changed, fresh, ambiguous: false }
+        let between = Between::new(&wedges, log).filter(|_| coarse_normals);
+        WedgeReplay {
+            log,
+            wedges,
+            slot,
+            count,
+            out,
+            values,
+            pairs,
+            changed,
+            fresh,
+            between,
+            ambiguous: false,
+        }
     }
 
     /// The slots of the wedges of a triangle.
@@ -76,7 +88,8 @@ impl<'a> WedgeReplay<'a> {
 
     /// What the splits make of the base's wedges; once.
     pub(super) fn streams(&mut self) -> WedgeStreams {
-        std::mem::take(&mut self.out)
+        let rows = std::mem::take(&mut self.values).into();
+        WedgeStreams { rows, ..std::mem::take(&mut self.out) }
     }
 
     /// Writes down where the wedges at full detail are not the input's. `face` is the slot of every face of the mesh.
@@ -165,10 +178,10 @@ impl<'a> WedgeReplay<'a> {
         }
         self.slot[fine as usize] = self.count;
         self.count += 1;
-        push_row(&mut self.out, &self.wedges, fine);
+        push_row((&mut self.out.present, &mut self.values), &self.wedges, &self.between, fine);
         if !self.changed.is_empty() {
             bits |= SplitCode::ROWS;
-            push_row(&mut self.out, &self.wedges, coarse);
+            push_row((&mut self.out.present, &mut self.values), &self.wedges, &self.between, coarse);
         }
         Some(bits)
     }
@@ -234,11 +247,13 @@ impl<'a> WedgeReplay<'a> {
         for &w in new {
             self.slot[w as usize] = self.count;
             self.count += 1;
-            push_row(&mut self.out, &self.wedges, w);
+            push_row((&mut self.out.present, &mut self.values), &self.wedges, &self.between, w);
         }
         if !rows.is_empty() {
             bits |= SplitCode::ROWS;
-            rows.iter().for_each(|&w| push_row(&mut self.out, &self.wedges, w));
+            rows.iter().for_each(|&w| {
+                push_row((&mut self.out.present, &mut self.values), &self.wedges, &self.between, w)
+            });
         }
         if !simple {
             let slot = |w: u32| self.slot[w as usize];
@@ -278,6 +293,9 @@ impl<'a> WedgeReplay<'a> {
             w.set_present(id, present);
             w.row_mut(id).copy_from_slice(&log.values[k * stride..(k + 1) * stride]);
             self.changed.push(id);
+            if let Some(b) = &mut self.between {
+                b.left[id as usize] -= 1;
+            }
         }
     }
 
@@ -294,9 +312,40 @@ impl<'a> WedgeReplay<'a> {
     }
 }
 
+/// What makes normals between base and full detail coarser.
+struct Between {
+    /// For every wedge, how many changes of its values are still to be undone.
+    left: Vec<u32>,
+    /// Where in a row the normal is.
+    at: usize,
+}
+
+impl Between {
+    /// `None` without normals.
+    fn new(wedges: &Wedges, log: &CollapseLog) -> Option<Between> {
+        let channels = wedges.channels();
+        let k = channels.iter().position(|c| c.semantic == Semantic::Normal && c.width == 3)?;
+        let at = channels[..k].iter().map(|c| c.width).sum();
+        let mut left = vec![0; wedges.len()];
+        log.rows.iter().for_each(|r| left[r.0 as usize] += 1);
+        Some(Between { left, at })
+    }
+}
+
 /// Appends the row of wedge `w`.
 #[inline]
-fn push_row(out: &mut WedgeStreams, wedges: &Wedges, w: u32) {
-    out.rows.extend_from_slice(wedges.row(w));
-    out.present.push(wedges.present(w));
+fn push_row(
+    (present, values): (&mut Presence, &mut Vec<f32>),
+    wedges: &Wedges,
+    between: &Option<Between>,
+    w: u32,
+) {
+    values.extend_from_slice(wedges.row(w));
+    if let Some(b) = between.as_ref().filter(|b| b.left[w as usize] > 0) {
+        let end = values.len() - wedges.stride() + b.at;
+        if let [x, y, z, ..] = &mut values[end..] {
+            [*x, *y, *z] = directions::snapped([*x, *y, *z]);
+        }
+    }
+    present.push(wedges.present(w));
 }

@@ -1,9 +1,11 @@
 //! From the mesh of the last frame to that of this one.
 
-use super::clock::{Clock, Found, Judges};
+use super::clock::{Clock, Judges};
 use super::entry::Entry;
+use super::refine::Open;
+use super::survey::LOT;
 use super::{Lens, Split, View};
-use crate::aif::NONE;
+use std::borrow::Cow;
 
 /// How far a frame may go.
 #[derive(Clone, Copy)]
@@ -102,30 +104,6 @@ impl<'a> Meter<'a> {
     }
 }
 
-/// A record that is due.
-#[derive(Clone, Copy)]
-pub(super) struct Due {
-    pub(super) record: u32,
-    /// The split that it is of: it may be used again.
-    pub(super) made: u32,
-    /// The slack of the decision to keep that split; 0 if that was not found.
-    pub(super) kept: f32,
-}
-
-/// What was found out about a record ahead: whether to keep its split, if that could be undone, and whether the next is needed.
-#[derive(Clone, Copy)]
-pub(super) struct Look {
-    keep: Option<Found>,
-    pub(super) next: Option<Found>,
-}
-
-/// Splits that are looked at, or got ready, at a time: enough that memory is waited for together, and few enough to be in the nearest cache.
-pub(super) const LOT: usize = 32;
-
-/// Records from which on threads look ahead: below, handing out the work takes as long.
-#[cfg(feature = "parallel")]
-const MANY: usize = 4096;
-
 impl View {
     /// Adapts the mesh to a lens, as far as the limits allow: first undoes what is not needed, then applies what is, the worst first.
     ///
@@ -140,7 +118,6 @@ impl View {
         let mut meter = Meter::new(limits);
         let judges = Judges::new(lenses, limits.hysteresis);
         let stands = self.clock.go_on(&judges);
-        let mut due = self.take_due(!stands);
         // First what a limit cut short: else coarsening would undo what is only there for the rest of it, frame after frame.
         if let Some(i) = self.unfinished.take()
             && !self.front.is_applied(i)
@@ -148,13 +125,12 @@ impl View {
         {
             self.apply_with_all(&Split::new(i), &mut meter, &mut Vec::new());
         }
-        let ahead = self.look_ahead(&due, &judges, limits);
+        // With what has just come.
+        let due = self.take_due(!stands);
         self.resume = 0;
+        let needed = self.coarsen(&judges, &mut meter, due);
         if !meter.over {
-            self.coarsen(&judges, &mut meter, &mut due, &ahead);
-        }
-        if !meter.over {
-            self.refine(&judges, &mut meter, &due, &ahead);
+            self.refine(&judges, &mut meter, needed);
         }
         self.front.settle();
         meter.done.complete = !meter.over && meter.done.refused == 0;
@@ -162,7 +138,7 @@ impl View {
     }
 
     /// The records that are due, from where the last frame was cut short; all of them if nothing stands. Until they have been looked at they stay due.
-    fn take_due(&mut self, all: bool) -> Vec<Due> {
+    fn take_due(&mut self, all: bool) -> Vec<u32> {
         let (now, late) = (self.clock.now(), self.clock.late());
         let mut due = Vec::new();
         let mut first = 0;
@@ -174,141 +150,75 @@ impl View {
                         r.due = late;
                     } else if all || Clock::has_come(now, r.due) {
                         r.due = now;
-                        due.push(Due { record: k, made: r.made, kept: 0.0 });
+                        due.push(k);
                     }
                 }
             }
             first += 16;
         }
-        let from = due.partition_point(|d| d.record < self.resume);
+        let from = due.partition_point(|&r| r < self.resume);
         due.rotate_left(from);
         due
     }
 
-    /// What is to be known of all that is due. Who goes through it asks for what would be found out otherwise, so its being there changes nothing but the time: it is found out in one go for all, or by
-    /// several threads. Not where a deadline may come first.
-    fn look_ahead(&self, due: &[Due], judges: &Judges<'_>, limits: &Limits<'_>) -> Vec<Look> {
-        if limits.expired.is_some() && due.len() > LOOKS {
-            return Vec::new();
-        }
-        #[cfg(feature = "parallel")]
-        if due.len() >= MANY && rayon::current_num_threads() > 1 {
-            use rayon::prelude::*;
-            let parts: Vec<Vec<Look>> = due.par_chunks(MANY / 4).map(|d| self.look_at(d, judges)).collect();
-            return parts.concat();
-        }
-        self.look_at(due, judges)
-    }
-
-    /// Each step for a lot before the next: they wait for memory, and then wait together.
-    fn look_at(&self, due: &[Due], judges: &Judges<'_>) -> Vec<Look> {
-        let (h, forest) = (&*self.hierarchy, &self.hierarchy.forest);
-        let (last, next) = (judges.last(&self.clock), judges.next(&self.clock));
-        let mut looks = vec![Look { keep: None, next: None }; due.len()];
-        let (mut entries, mut found) = (Vec::with_capacity(LOT), Vec::with_capacity(LOT));
-        for (part, looks) in due.chunks(LOT).zip(looks.chunks_mut(LOT)) {
-            // The splits of each vertex, and how many of them are applied; of the vertex that was split to make it as well.
-            let mut chains = [[&[][..]; 2]; LOT];
-            let mut turns = [0; LOT];
-            let mut lasts = [false; LOT];
-            for ((chains, is), d) in chains.iter_mut().zip(&mut lasts).zip(part) {
-                chains[0] = forest.chain(self.front.vertex_of_record(d.record));
-                *is = self.is_last(d);
-                chains[1] = if *is { forest.chain(h.mesh().splits.vertex[d.made as usize]) } else { &[] };
-            }
-            for (t, chains) in turns.iter_mut().zip(&chains) {
-                *t = self.front.turns_of(chains[0]);
-            }
-            entries.clear();
-            found.clear();
-            for ((d, chains), _) in part.iter().zip(&chains).zip(lasts).filter(|l| l.1) {
-                let turn = chains[1].iter().position(|&i| i >= d.made).unwrap_or(0);
-                let v = h.mesh().splits.vertex[d.made as usize];
-                entries.push(Entry::after(h, d.made, v, &chains[1][..turn]));
-            }
-            last.look(&entries, &mut found);
-            let kept = looks.iter_mut().zip(lasts).filter(|l| l.1);
-            kept.zip(&found).for_each(|((look, _), &f)| look.keep = Some(f));
-            entries.clear();
-            found.clear();
-            let mut open = [false; LOT];
-            for (((d, chains), &turn), open) in part.iter().zip(&chains).zip(&turns).zip(&mut open) {
-                if self.front.records[d.record as usize].made == d.made
-                    && let Some(&i) = chains[0].get(turn)
-                {
-                    *open = true;
-                    let v = self.front.vertex_of_record(d.record);
-                    entries.push(Entry::after(h, i, v, &chains[0][..turn]));
-                }
-            }
-            next.look(&entries, &mut found);
-            let open = looks.iter_mut().zip(open).filter(|l| l.1);
-            open.zip(&found).for_each(|((look, _), &f)| look.next = Some(f));
-        }
-        looks
-    }
-
-    /// The record is still what it was, and nothing depends on its split: that could be undone.
-    #[inline]
-    fn is_last(&self, d: &Due) -> bool {
-        let r = &self.front.records[d.record as usize];
-        d.made != NONE && r.made == d.made && r.dependents == 0
-    }
-
-    /// Undoes splits that are not needed, until none is left that could be.
-    fn coarsen(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, due: &mut [Due], ahead: &[Look]) {
-        let mut freed = Vec::new();
-        for (k, d) in due.iter_mut().enumerate() {
+    /// Looks at what is due and undoes what is not needed, until nothing is left that could be; returns what is needed of the splits that come next. What a limit cuts short stays due.
+    fn coarsen(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, due: Vec<u32>) -> Vec<Open> {
+        // All at once, unless time may be over before.
+        let each = if meter.limits.expired.is_some() { LOOKS / 2 } else { due.len().max(1) };
+        let mut needed = Vec::new();
+        for part in due.chunks(each) {
             if !meter.goes_on() {
-                self.resume = d.record;
-                return;
+                self.resume = part.first().copied().unwrap_or_default();
+                break;
             }
-            // What has become free in the meantime is in the other list.
-            if !self.is_last(d) || (!ahead.is_empty() && ahead[k].keep.is_none()) {
-                continue;
-            }
-            meter.looks += 1;
-            let known = ahead.get(k).and_then(|a| a.keep);
-            let look = || judges.of_last(&Entry::of(&self.hierarchy, d.made), &self.clock).into();
-            let found = known.unwrap_or_else(look);
-            if found.wanted {
-                d.kept = found.slack;
-                continue;
-            }
-            self.undo_and_list(d.made, &mut freed);
-            meter.done.collapses += 1;
-            meter.since += 1;
-        }
-        let last = judges.last(&self.clock);
-        let (mut entries, mut kept) = (Vec::new(), Vec::new());
-        while !freed.is_empty() {
-            let lot = freed.split_off(freed.len().saturating_sub(LOT));
-            entries.clear();
-            kept.clear();
-            entries.extend(lot.iter().map(|&i| Entry::of(&self.hierarchy, i)));
-            last.wanted(&entries, &mut kept);
-            meter.looks += lot.len();
-            for (&i, _) in lot.iter().zip(&kept).filter(|k| !k.1) {
-                // What is left of the list is due, as it has become free.
-                if !meter.goes_on() {
-                    self.resume = due.first().map_or(0, |d| d.record);
-                    return;
+            // Of parts before it may have been undone.
+            let there: Cow<'_, [u32]> = match part.len() == due.len() {
+                true => part.into(),
+                false => {
+                    part.iter().copied().filter(|&r| !self.front.records[r as usize].is_free()).collect()
                 }
-                // It may have come in twice.
-                if self.front.is_applied(i) && self.is_free(i) {
-                    self.undo_and_list(i, &mut freed);
+            };
+            let survey = self.survey(&there, judges);
+            meter.looks += survey.looks;
+            for (&r, &slack) in there.iter().zip(&survey.slack).filter(|s| *s.1 >= 0.0) {
+                self.front.records[r as usize].due = self.clock.due(f64::from(slack), r);
+            }
+            self.undo_all(survey.unneeded, judges, meter);
+            if meter.over {
+                self.resume = part.first().copied().unwrap_or_default();
+                break;
+            }
+            needed.extend(survey.needed);
+        }
+        needed
+    }
+
+    /// Undoes splits that can be undone and are not needed, and what becomes free by that and is not needed either.
+    fn undo_all(&mut self, mut unneeded: Vec<u32>, judges: &Judges<'_>, meter: &mut Meter<'_>) {
+        let last = judges.last(&self.clock);
+        let (mut freed, mut entries, mut kept) = (Vec::new(), Vec::new(), Vec::new());
+        while !unneeded.is_empty() {
+            for lot in unneeded.chunks(LOT) {
+                self.fetch_made(lot);
+                for &i in lot {
+                    if !meter.goes_on() {
+                        return;
+                    }
+                    self.undo(i, &mut freed);
                     meter.done.collapses += 1;
                     meter.since += 1;
                 }
             }
+            unneeded.clear();
+            meter.looks += freed.len();
+            for lot in freed.chunks(LOT) {
+                entries.clear();
+                kept.clear();
+                entries.extend(lot.iter().map(|&i| Entry::of(&self.hierarchy, i)));
+                last.wanted(&entries, &mut kept);
+                unneeded.extend(lot.iter().zip(&kept).filter(|k| !k.1).map(|k| *k.0));
+            }
+            freed.clear();
         }
-    }
-
-    /// Undoes split `i`; appends what has become free by that.
-    #[inline]
-    fn undo_and_list(&mut self, i: u32, freed: &mut Vec<u32>) {
-        self.undo(i);
-        let needs = self.hierarchy.forest.needs.of(i);
-        freed.extend(needs.iter().copied().filter(|&n| self.is_free(n)));
     }
 }

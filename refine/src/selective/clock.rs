@@ -12,7 +12,7 @@
 
 mod near;
 
-pub(crate) use near::{Clocks, Due};
+pub(crate) use near::{Clocks, Due, Looked};
 
 use super::Lens;
 use super::entry::Entry;
@@ -46,6 +46,8 @@ impl From<Verdict> for Found {
 enum About {
     Middle,
     Eye,
+    /// The eye, however far: how far places are is looked after apart.
+    Each,
 }
 
 /// How slack is measured: it must not change while decisions stand.
@@ -67,6 +69,8 @@ pub(crate) struct Clock {
     /// The part of the tolerance at which splits are undone.
     keep: f64,
     pace: Pace,
+    /// Steps to a length of slack that counts.
+    steps: f64,
     now: u16,
 }
 
@@ -92,6 +96,7 @@ impl Pace {
         match self.about {
             About::Middle => 0.5 * self.diagonal,
             About::Eye => self.diagonal,
+            About::Each => f64::INFINITY,
         }
     }
 
@@ -101,6 +106,7 @@ impl Pace {
             About::Middle => [1.0 / self.reach(), 0.0, 0.0],
             // The eye comes no farther away than the clock reaches.
             About::Eye => [0.0, 1.0 / self.reach(), 0.25],
+            About::Each => [0.0; 3],
         }
     }
 
@@ -110,6 +116,7 @@ impl Pace {
         match self.about {
             About::Middle => !lens.perspective || eye > 0.4 * self.diagonal,
             About::Eye => lens.perspective && eye < 0.6 * self.diagonal,
+            About::Each => lens.perspective,
         }
     }
 
@@ -132,7 +139,7 @@ impl Pace {
             let off = if d == d2 { 0.0 } else { d2 - d };
             turn + match self.about {
                 About::Middle => (n.dot(o) - n2.dot(o2) + off).abs(),
-                About::Eye => (o2 - o).length() + off.abs(),
+                About::Eye | About::Each => (o2 - o).length() + off.abs(),
             }
         };
         let mut most = by_tau.max(self.eye * (b.eye - a.eye).length());
@@ -156,7 +163,7 @@ impl Clock {
     /// Before the first lens.
     pub(crate) fn new(diagonal: f64) -> Clock {
         let pace = Pace { about: About::Middle, diagonal, per_tau: f64::INFINITY, eye: EYE };
-        Clock { lenses: Vec::new(), keep: 1.0, pace, now: 0 }
+        Clock { lenses: Vec::new(), keep: 1.0, pace, steps: SAFE * STEPS / diagonal, now: 0 }
     }
 
     /// Goes on to the lenses of a frame; false if nothing that was decided stands, and all is due.
@@ -207,7 +214,7 @@ impl Clock {
     #[inline]
     pub(crate) fn due(&self, slack: f64, salt: u32) -> u16 {
         let most = AHEAD - (salt.wrapping_mul(0x9e37_79b1) >> 18) as u16;
-        let steps = slack * SAFE / self.pace.diagonal * STEPS;
+        let steps = slack * self.steps;
         // NaN is 0.
         self.now.wrapping_add(if steps >= most as f64 { most } else { steps as u16 })
     }
@@ -251,17 +258,18 @@ impl Lens {
             if self.perspective {
                 let along = self.gradient.dot(line) - self.steep * radius;
                 let about = self.slant * (away - radius);
-                let speeds = [self.steep * far + grows, self.slant / pace.eye + grows, grows];
-                let depths = [along, about, self.near];
+                let moves = self.slant / pace.eye + grows;
+                let speeds = [self.steep * far + grows, moves, grows, moves];
+                let depths = [along, about, self.near, self.floor];
                 let above = |k: usize| {
                     let d = depths[k] - fine;
                     if speeds[k] > 0.0 { d / speeds[k] } else { d * f64::INFINITY }
                 };
                 if depths.iter().any(|&d| d > fine) {
-                    let slack = (0..3).filter(|&k| depths[k] > fine).map(above).fold(0.0, f64::max);
+                    let slack = (0..4).filter(|&k| depths[k] > fine).map(above).fold(0.0, f64::max);
                     return Verdict { wanted: false, slack: slack.min(until) };
                 }
-                let below = (0..3).map(|k| -above(k)).filter(|s| !s.is_nan());
+                let below = (0..4).map(|k| -above(k)).filter(|s| !s.is_nan());
                 slack = below.fold(slack, f64::min).min(until);
             } else {
                 let by = if grows > 0.0 { (1.0 - fine).abs() / grows } else { f64::INFINITY };
@@ -350,17 +358,13 @@ impl<'a> Judges<'a> {
     }
 
     /// A split that is applied is to be kept.
-    #[inline]
-    pub(crate) fn keep(&self, e: &Entry) -> bool {
+    #[cfg(test)]
+    fn keep(&self, e: &Entry) -> bool {
         self.lenses.iter().any(|l| l.wants(e, self.keep * l.tau))
     }
 
-    /// Whether a split is needed, and for how long that stands.
-    pub(crate) fn of_next(&self, e: &Entry, clock: &Clock) -> Verdict {
-        self.of(e, 1.0, &clock.pace)
-    }
-
     /// Whether a split is to be kept, and for how long that stands.
+    #[cfg(test)]
     pub(crate) fn of_last(&self, e: &Entry, clock: &Clock) -> Verdict {
         self.of(e, self.keep, &clock.pace)
     }
@@ -410,7 +414,7 @@ impl<'a> Judges<'a> {
 }
 
 /// Asks about many splits with one tolerance; the answers are those of [`Judges`].
-pub(super) struct Many<'a> {
+pub(crate) struct Many<'a> {
     judges: Judges<'a>,
     part: f64,
     pace: Pace,
@@ -489,6 +493,9 @@ pub(super) mod tests {
             let placed = DMat4::from_scale(DVec3::splat(1.7));
             let c = c.unwrap();
             let lens = Lens::about(DVec3::ZERO, &c, &placed, self.tau, cull).unwrap();
+            // Some know how large the whole mesh is.
+            let within = matches!(cull, Cull::All | Cull::Frustum);
+            let lens = if within { lens.within(DIAGONAL / 1.7) } else { lens };
             // Some by where they lie to the line of sight, some of these along a line of the world too.
             match (self.directional, cull) {
                 (true, Cull::Cone) => lens.directional().upright(&c, DVec3::new(0.6, 0.8, 0.0)),

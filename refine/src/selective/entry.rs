@@ -19,19 +19,7 @@ impl Entry {
         Entry::placed(h, i, h.local_centre(i))
     }
 
-    /// Of split `i` of vertex `v`, which comes after those of its chain that are given.
-    #[inline]
-    pub(super) fn after(h: &Hierarchy, i: u32, v: u32, before: &[u32]) -> Entry {
-        Entry::at(h, i, h.forest.place_after(h.mesh(), v, before))
-    }
-
-    /// Of split `i`, of a vertex that stands there.
-    #[inline]
-    pub(super) fn at(h: &Hierarchy, i: u32, place: glam::DVec3) -> Entry {
-        Entry::placed(h, i, h.bounds.local(place))
-    }
-
-    /// The same of a place about the origin of the bounds.
+    /// Of split `i`, at a place about the origin of the bounds.
     #[inline]
     pub(super) fn placed(h: &Hierarchy, i: u32, at: Vec3) -> Entry {
         Entry::new(i, at, h.bounds.of[i as usize]).with_direction(h)

@@ -4,6 +4,7 @@ use super::index::Index;
 use super::patch::{self, Known, Sheet};
 use crate::aif::NONE;
 use crate::hierarchy::Forest;
+use crate::packed::Run;
 use crate::progressive::{Damage, Explicit, Fans, Half, NO_ENTRY, ProgressiveMesh, SplitKind, link_faces};
 
 /// A set of applied splits that is closed under dependencies, and the mesh it makes.
@@ -14,18 +15,18 @@ use crate::progressive::{Damage, Explicit, Fans, Half, NO_ENTRY, ProgressiveMesh
 /// Memory: 48 B of faces and links, 8 B of record and 4 to 5 B of index for a vertex there; for one of the finest mesh a quarter of a byte, and with attributes 8 B.
 #[derive(Clone, Debug)]
 pub(crate) struct Front {
-    fans: Fans,
-    base_vertices: u32,
+    pub(super) fans: Fans,
+    pub(super) base_vertices: u32,
     base_faces: u32,
     pub(super) records: Vec<Record>,
     /// The splits that are applied, and where they have their records.
-    index: Index,
+    pub(super) index: Index,
     /// The first record that is free, which tells the next; [`LAST`] for none.
-    free: u32,
+    pub(super) free: u32,
     wedge_vertex: Vec<u32>,
     /// The row of every wedge, among those in the mesh.
     wedge_row: Vec<u32>,
-    vertices: usize,
+    pub(super) vertices: usize,
     faces: usize,
     /// Slots whose corners changed, a bit each.
     pub(super) touched: Vec<u64>,
@@ -47,26 +48,17 @@ pub(super) struct Record {
 /// Set in what free records say that they were made by: splits are fewer.
 const FREE: u32 = 1 << 31;
 /// The end of the free records.
-const LAST: u32 = FREE - 2;
+pub(super) const LAST: u32 = FREE - 2;
 
 impl Record {
+    #[inline]
     pub(super) fn is_free(self) -> bool {
         self.made & FREE != 0 && self.made != NONE
     }
 }
 
-/// Splits of a vertex that are looked at one by one.
+/// Splits of a vertex that are looked at one by one, before a search.
 const SHORT: usize = 4;
-
-/// What vectors may hold beyond what they need when a frame is over: a part in 32, and so many.
-const SPARE: usize = 64;
-
-fn settle<T>(v: &mut Vec<T>) {
-    let most = v.len() + v.len() / 32 + SPARE;
-    if v.capacity() > most {
-        v.shrink_to(most);
-    }
-}
 
 impl Front {
     /// The base. The arrays of `pm` have been checked by a cursor.
@@ -142,7 +134,7 @@ impl Front {
 
     /// The first slot of a record of a split.
     #[inline]
-    fn first_slot(&self, r: u32) -> u32 {
+    pub(super) fn first_slot(&self, r: u32) -> u32 {
         self.base_faces + 2 * (r - self.base_vertices)
     }
 
@@ -205,13 +197,22 @@ impl Front {
     }
 
     /// How many splits of a chain are applied.
-    #[inline]
-    pub(super) fn turns_of(&self, chain: &[u32]) -> usize {
-        // Short chains from the front: few are longer, and those of the base.
-        match chain.iter().take(SHORT).position(|&j| !self.is_applied(j)) {
-            Some(k) => k,
-            None => chain.partition_point(|&j| self.is_applied(j)),
+    #[inline(always)]
+    fn turns_of(&self, chain: Run<'_>) -> usize {
+        self.next_of(chain).0
+    }
+
+    /// The same, and the split that comes next; [`NONE`] if there is none.
+    #[inline(always)]
+    pub(super) fn next_of(&self, chain: Run<'_>) -> (usize, u32) {
+        // The first ones are: of the first few all are asked, as what a branch would wait for cannot be foreseen. Few chains have more.
+        let head: [u32; SHORT] = std::array::from_fn(|k| chain.get(k).unwrap_or(NONE));
+        let applied = head.iter().filter(|&&j| j != NONE && self.is_applied(j)).count();
+        if let Some(&next) = head.get(applied) {
+            return (applied, next);
         }
+        let applied = chain.partition_point(|j| self.is_applied(j));
+        (applied, chain.get(applied).unwrap_or(NONE))
     }
 
     /// The node that vertex `v` is at; [`NONE`] if it is not in the mesh.
@@ -266,6 +267,16 @@ impl Front {
             sum ^= corner(cut >> 2) ^ link(across, 0) ^ corner(across);
         }
         sum
+    }
+
+    /// Reads the first face of split `i`, which is applied, and those around it.
+    #[inline]
+    pub(super) fn fetch_made(&self, i: u32) -> u32 {
+        let slot = self.first_slot(self.record(i)) as usize;
+        let link = |slot: usize| self.fans.links.get(slot).copied().unwrap_or([NONE; 3]);
+        let corner = |slot: usize| self.fans.corners.get(slot).map_or(0, |c| c[0]);
+        let around = link(slot).map(|l| (l >> 3) as usize);
+        around.iter().fold(corner(slot), |sum, &s| sum ^ link(s)[0] ^ corner(s))
     }
 
     /// As [`Front::split`], with what [`Front::cuts`] has found; what it has not is looked for again.
@@ -375,7 +386,7 @@ impl Front {
     }
 
     #[inline]
-    fn touch(&mut self, slot: u32) {
+    pub(super) fn touch(&mut self, slot: u32) {
         self.touched[slot as usize / 64] |= 1 << (slot % 64);
     }
 
@@ -406,14 +417,6 @@ impl Front {
         self.index.remove(i);
         self.records[r as usize].made = FREE | self.free;
         self.free = r;
-    }
-
-    /// Gives back what vectors have grown beyond what they need.
-    pub(super) fn settle(&mut self) {
-        settle(&mut self.records);
-        settle(&mut self.fans.corners);
-        settle(&mut self.fans.links);
-        self.index.settle();
     }
 
     /// Bytes that grow with the mesh shown, and bytes that each view takes for the whole mesh.

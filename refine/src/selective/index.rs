@@ -42,6 +42,7 @@ const FIT: [u8; 65] = {
 const SPARE: usize = 64;
 
 impl Block {
+    #[inline]
     fn len(self) -> usize {
         self.bits.count_ones() as usize
     }
@@ -120,6 +121,12 @@ impl Index {
         }
     }
 
+    /// Gives a split that is in the set another record.
+    pub(super) fn replace(&mut self, i: u32, record: u32) {
+        let block = self.blocks[i as usize / 64];
+        self.pool[block.start as usize + block.rank(i)] = record;
+    }
+
     /// Gives the run of a block back.
     fn leave(&mut self, at: usize) {
         let Block { start, room, .. } = self.blocks[at];
@@ -156,6 +163,10 @@ impl Index {
             let mut pool = Vec::with_capacity(self.least);
             for block in &mut self.blocks {
                 let (from, count) = (block.start as usize, block.len());
+                if count == 0 {
+                    *block = Block::default();
+                    continue;
+                }
                 (block.start, block.room) = (pool.len() as u32, FIT[count]);
                 let end = pool.len() + ROOMS[FIT[count] as usize] as usize;
                 pool.extend_from_slice(&self.pool[from..from + count]);
@@ -195,6 +206,9 @@ mod tests {
             } else if !map.contains_key(&i) && (up || state.is_multiple_of(3)) {
                 index.insert(i, step);
                 map.insert(i, step);
+            } else if map.contains_key(&i) {
+                index.replace(i, !step);
+                map.insert(i, !step);
             }
             if step % 777 == 0 {
                 index.settle();

@@ -50,6 +50,8 @@ pub struct Lens {
     /// Pixels at depth 1 of a length of the mesh.
     pub(super) lambda: f64,
     pub(super) near: f64,
+    /// A depth that nothing of the mesh is below, by the sphere around all of it; below 0 if the eye is in that.
+    pub(super) floor: f64,
     /// Of what is in the picture, depth is at least this times the distance from the eye, lengths of the mesh.
     pub(super) slant: f64,
     pub(super) perspective: bool,
@@ -63,6 +65,8 @@ pub struct Lens {
 
 /// Of a length seen along itself so much counts: scales must have a quotient.
 const LEAST: f64 = 1e-6;
+/// What rounding of places may add to the box.
+const ROUND: f64 = 1e-6;
 
 impl Lens {
     /// For a mesh that stands where `placed` puts it (the identity: where its coordinates say), seen by `camera`, with errors up to `tau` pixels.
@@ -78,7 +82,8 @@ impl Lens {
         tau: f64,
         cull: Cull,
     ) -> Result<Lens, LensError> {
-        Self::about(hierarchy.bounds.origin, camera, placed, tau, cull)
+        let bounds = &hierarchy.bounds;
+        Ok(Self::about(bounds.origin, camera, placed, tau, cull)?.within(bounds.diagonal))
     }
 
     /// The same for bounds about `origin`.
@@ -116,6 +121,7 @@ impl Lens {
             steep: gradient.length(),
             lambda: camera.pixel_scale() * most,
             near: camera.near().max(0.0),
+            floor: f64::NEG_INFINITY,
             slant: least / (1.0 + corner * corner).sqrt(),
             perspective: camera.is_perspective(),
             directional: false,
@@ -145,6 +151,11 @@ impl Lens {
         Lens { lambda: self.lambda * most, lift, ..self }
     }
 
+    /// For a mesh whose box has this diagonal. Spheres of splits may be large where the surface is flat: vertices go far there that matter little, and spheres hold those below them.
+    pub(crate) fn within(self, diagonal: f64) -> Lens {
+        Lens { floor: self.slant * (self.eye.length() - 0.5 * diagonal * (1.0 + ROUND)), ..self }
+    }
+
     /// What an error of 1 takes up at depth 1, where `tau` is allowed.
     #[inline]
     pub(super) fn scale(&self, tau: f64) -> f64 {
@@ -159,6 +170,20 @@ impl Lens {
     /// It takes bounds that know directions ([`crate::hierarchy::Options::directions`]); by others errors count as they did. So they do where the mesh is placed by a matrix that changes angles.
     pub fn directional(self) -> Lens {
         Lens { directional: self.similar, ..self }
+    }
+
+    /// About where the lens is after so many steps like that from `before`: what is asked of it is not promised.
+    pub(super) fn going_on(&self, before: &Lens, steps: f64) -> Lens {
+        let on = |is: DVec3, was: DVec3| is + steps * (is - was);
+        let turned = |is: DVec3, was: DVec3| on(is, was).normalize_or_zero() * is.length();
+        let (mut sides, was) = (self.sides, &before.sides);
+        sides.origin = on(sides.origin, was.origin);
+        for k in 0..6 {
+            let n = |s: &Sides| DVec3::new(s.x[k], s.y[k], s.z[k]);
+            [sides.x[k], sides.y[k], sides.z[k]] = turned(n(&sides), n(was)).to_array();
+        }
+        let gradient = turned(self.gradient, before.gradient);
+        Lens { eye: on(self.eye, before.eye), look: turned(self.look, before.look), gradient, sides, ..*self }
     }
 
     /// The tolerance, pixels.
@@ -194,7 +219,7 @@ impl Lens {
         }
         let d = centre - self.eye;
         let along = self.gradient.dot(d) - self.steep * radius;
-        let along = along.max(self.near);
+        let along = along.max(self.near).max(self.floor);
         if along > enough {
             return along;
         }

@@ -1,6 +1,7 @@
 //! Geomorphs of a view, without memory of earlier frames.
 
 use super::cut::{Ascent, ascent, morphed};
+use super::timed_rows::rows_of;
 use super::{Lens, View};
 use crate::aif::{MeshInput, NONE};
 use crate::geomorph::Mix;
@@ -34,29 +35,23 @@ impl View {
 
     fn morphed_row_by(&self, mix: &Mix, lenses: &[Lens], w: u32, band: f64) -> Option<(Vec<f32>, u64)> {
         let h = &*self.hierarchy;
-        let (streams, rows) = (h.mesh().wedges.as_ref()?, h.forest.rows.as_ref()?);
-        let values = |r: u32| {
-            let at = r as usize * streams.stride;
-            (&streams.rows[at..at + streams.stride], streams.present[r as usize])
-        };
+        let streams = h.mesh().wedges.as_ref()?;
+        let values = |r: u32| (streams.rows.row(r as usize, streams.stride), streams.present[r as usize]);
         let mut row = Some(self.front.wedge_row(w)).filter(|&r| r != NONE)?;
         let Ascent { steps, .. } = ascent(self, lenses, self.front.wedge_vertex(w), band)?;
         // The row before each split that made one, and how far that has shown itself.
         let mut way = Vec::new();
         for (_, _, i, part) in steps {
-            let end = |i: u32| match (i as usize) < h.splits() {
-                true => rows.of(h.mesh(), i).row,
-                false => streams.present.len() as u32,
-            };
-            if (end(i)..end(i + 1)).contains(&row) {
+            if rows_of(h, i).contains(&row) {
                 way.push((row, part));
                 row = h.row_parents().get(row as usize).copied().unwrap_or(row);
             }
         }
         let (start, mut has) = values(row);
-        let (mut now, mut next) = (start.to_vec(), start.to_vec());
+        let (mut now, mut next) = (start.to_vec(), start.into_owned());
         for (row, part) in way.into_iter().rev() {
-            has = mix.row((&now, has), values(row), part, &mut next);
+            let (to, will) = values(row);
+            has = mix.row((&now, has), (&to, will), part, &mut next);
             std::mem::swap(&mut now, &mut next);
         }
         Some((now, has))

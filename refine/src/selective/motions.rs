@@ -19,12 +19,16 @@ pub(crate) trait Stage: Cut {
     fn changed(&self) -> Vec<u32>;
     /// The splits that linger, ascending.
     fn lingering(&self) -> Vec<u32>;
-    /// Nothing drawn depends on split `i`, which is drawn.
+    /// Nothing drawn depends on split `i`, which is drawn, and nothing of it is on the way but vertices.
     fn is_free(&self, i: u32) -> bool;
     /// Applies split `i`, what it depends on being drawn.
     fn draw(&mut self, i: u32) -> Result<(), Self::Error>;
     /// Undoes split `i`, which is drawn and free.
     fn undraw(&mut self, i: u32) -> Result<(), Self::Error>;
+    /// What else moves is sent to where it belongs, now that these splits have begun or ceased to be led.
+    fn send_more(&mut self, _changed: &[u32], _lenses: &[Lens]) {}
+    /// What else moves goes a step further.
+    fn step_more(&mut self) {}
 }
 
 /// What a step did.
@@ -132,6 +136,8 @@ impl Motions {
         for (v, seen) in regions(stage, &changed, lenses) {
             self.send(v, seen, stage);
         }
+        stage.send_more(&changed, lenses);
+        stage.step_more();
         for m in self.of.values_mut().filter(|m| m.step < frames) {
             m.step += 1;
         }

@@ -47,13 +47,11 @@ impl View {
     }
 
     /// The attribute values of a wedge, and the channels it has; empty if it is not shown, or without attributes.
-    pub fn row(&self, w: u32) -> (&[f32], u64) {
+    pub fn row(&self, w: u32) -> (Cow<'_, [f32]>, u64) {
         let row = self.front.wedge_row(w) as usize;
         match &self.hierarchy.mesh().wedges {
-            Some(s) if row < s.present.len() => {
-                (&s.rows[row * s.stride..(row + 1) * s.stride], s.present[row])
-            }
-            _ => (&[], 0),
+            Some(s) if row < s.present.len() => (s.rows.row(row, s.stride), s.present[row]),
+            _ => (Cow::Borrowed(&[]), 0),
         }
     }
 
@@ -66,8 +64,7 @@ impl View {
     }
 
     pub(super) fn own_row(&self, w: u32) -> (Cow<'_, [f32]>, u64) {
-        let (row, present) = self.row(w);
-        (row.into(), present)
+        self.row(w)
     }
 
     /// Puts vertices elsewhere, ascending.

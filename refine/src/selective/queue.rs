@@ -39,6 +39,12 @@ impl Queue {
         out.extend(bucket.drain(from..));
     }
 
+    /// Puts back what was taken out last.
+    pub(super) fn put_back(&mut self, open: &mut Vec<Open>) {
+        self.len += open.len();
+        self.buckets[self.highest].append(open);
+    }
+
     /// How many there are.
     pub(super) fn len(&self) -> usize {
         self.len
@@ -63,6 +69,9 @@ mod tests {
         assert_eq!((pop(&mut q, 2), q.len()), (vec![8], 4));
         q.push(open(1), 12);
         assert_eq!((pop(&mut q, 2), pop(&mut q, 2), q.len()), (vec![1], vec![6, 5], 2));
+        q.put_back(&mut vec![open(6), open(5)]);
+        assert_eq!((q.len(), pop(&mut q, usize::MAX), q.len()), (4, vec![7, 6, 5], 1));
+        q.put_back(&mut vec![open(7)]);
         assert_eq!((pop(&mut q, 2), pop(&mut q, 2), pop(&mut q, 2), q.len()), (vec![7], vec![9], vec![], 0));
     }
 }

@@ -1,16 +1,17 @@
 //! The second half of a frame: what is needed is applied.
 //!
 //! Without limits it is found out first what is needed, then what that depends on, and then all of it is applied as it is numbered: so nothing waits for what comes before it, memory is asked for ahead, and mostly lies close
-//! together. With a limit the most urgent splits come first, with what each depends on, a lot at a time.
+//! together. With a limit of faces it is found out first, the most urgent splits before the others, what there is room for. With another limit the most urgent splits are applied first, with what each depends on, a lot at a time.
 
-use super::adapt::{Due, LOT, Look, Meter};
+use super::adapt::Meter;
 use super::clock::{Judges, Many};
 use super::entry::Entry;
 use super::queue::Queue;
+use super::survey::LOT;
 use super::{Split, View};
-use crate::aif::NONE;
 use crate::hierarchy::Hierarchy;
 use glam::Vec3;
+use std::ops::Range;
 
 /// A split that may come next at a vertex, how many of its splits come before, and where it stands then, about the origin of the bounds.
 #[derive(Clone, Copy, Debug, Default)]
@@ -51,11 +52,11 @@ fn below(h: &Hierarchy, lot: &[Open], out: &mut Vec<Open>) {
         let at = moved.map_or(o.at, |p| h.bounds.local(p));
         let turn = o.turn + 1;
         let next = h.forest.chain(o.vertex).get(turn as usize);
-        found[n] = Open { split: next.copied().unwrap_or(0), vertex: o.vertex, turn, at };
+        found[n] = Open { split: next.unwrap_or(0), vertex: o.vertex, turn, at };
         n += usize::from(next.is_some());
         let vertex = h.forest.base_vertices + o.split;
         let first = h.forest.chain(vertex).first();
-        let split = first.copied().unwrap_or(0);
+        let split = first.unwrap_or(0);
         let at = h.bounds.local(new);
         // Of a lot there are two each at most.
         if let Some(slot) = found.get_mut(n) {
@@ -66,9 +67,8 @@ fn below(h: &Hierarchy, lot: &[Open], out: &mut Vec<Open>) {
     out.extend_from_slice(&found[..n]);
 }
 
-/// Those below `wave` that are needed.
-fn needed_below(h: &Hierarchy, many: &Many<'_>, wave: &[Open]) -> Vec<Open> {
-    let mut out = Vec::with_capacity(wave.len());
+/// Tells those below `wave` that are needed.
+fn each_needed_below(h: &Hierarchy, many: &Many<'_>, wave: &[Open], mut tell: impl FnMut(&Open, &Entry)) {
     let (mut open, mut entries, mut wanted) = (Vec::new(), Vec::new(), Vec::new());
     for lot in wave.chunks(LOT) {
         open.clear();
@@ -77,69 +77,29 @@ fn needed_below(h: &Hierarchy, many: &Many<'_>, wave: &[Open]) -> Vec<Open> {
         below(h, lot, &mut open);
         entries.extend(open.iter().map(|o| o.entry(h)));
         many.wanted(&entries, &mut wanted);
-        out.extend(open.iter().zip(&wanted).filter(|o| *o.1).map(|o| *o.0));
+        let needed = open.iter().zip(&entries).zip(&wanted).filter(|o| *o.1);
+        needed.for_each(|((o, e), _)| tell(o, e));
     }
+}
+
+/// Those below `wave` that are needed.
+fn needed_below(h: &Hierarchy, many: &Many<'_>, wave: &[Open]) -> Vec<Open> {
+    let mut out = Vec::with_capacity(wave.len());
+    each_needed_below(h, many, wave, |o, _| out.push(*o));
     out
 }
 
 impl View {
-    /// Applies splits that are needed, until none is left.
-    pub(super) fn refine(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, due: &[Due], ahead: &[Look]) {
-        let Some(wave) = self.needed_of(judges, meter, due, ahead) else { return };
+    /// Applies splits that are needed, these and those below them, until none is left.
+    pub(super) fn refine(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, needed: Vec<Open>) {
         let limits = &meter.limits;
-        if limits.faces == usize::MAX && limits.operations == usize::MAX && limits.expired.is_none() {
-            self.refine_wholly(judges, meter, wave);
+        if limits.operations < usize::MAX || limits.expired.is_some() {
+            self.refine_urgently(judges, meter, &needed);
+        } else if limits.faces < usize::MAX {
+            self.refine_within(judges, meter, &needed);
         } else {
-            self.refine_urgently(judges, meter, &wave);
+            self.refine_wholly(judges, meter, needed);
         }
-    }
-
-    /// Those that are needed of the splits that come next; nothing if a limit was met before.
-    fn needed_of(
-        &mut self,
-        judges: &Judges<'_>,
-        meter: &mut Meter<'_>,
-        due: &[Due],
-        ahead: &[Look],
-    ) -> Option<Vec<Open>> {
-        let mut wave = Vec::new();
-        for (k, d) in due.iter().enumerate() {
-            if !meter.goes_on() {
-                self.resume = d.record;
-                return None;
-            }
-            let record = self.front.records[d.record as usize];
-            if record.made != d.made {
-                continue;
-            }
-            // What has become free since it was looked at stays due.
-            let stays = d.made == NONE || record.dependents > 0;
-            let kept = if stays { f32::INFINITY } else { d.kept };
-            meter.looks += 1;
-            // Unless its next split has just been undone.
-            let known = ahead.get(k).filter(|_| record.due == self.clock.now());
-            let entry = |o: Open| o.entry(&self.hierarchy);
-            let found = match known {
-                Some(look) => look.next,
-                None => self.open_at(d.record).map(|o| judges.of_next(&entry(o), &self.clock).into()),
-            };
-            match found {
-                Some(f) if f.wanted => wave.extend(self.open_at(d.record)),
-                f => {
-                    let slack = f64::from(f.map_or(kept, |f| kept.min(f.slack)));
-                    self.front.records[d.record as usize].due = self.clock.due(slack, d.record);
-                }
-            }
-        }
-        Some(wave)
-    }
-
-    /// The split that comes next at the vertex of a record that is there; nothing for a leaf.
-    fn open_at(&self, record: u32) -> Option<Open> {
-        let (split, vertex, turn) = self.next(record)?;
-        let h = &*self.hierarchy;
-        let at = h.bounds.local(h.forest.place(h.mesh(), vertex, turn));
-        Some(Open { split, vertex, turn: turn as u32, at })
     }
 
     /// Applies all that is needed.
@@ -163,16 +123,23 @@ impl View {
             while self.marked[word] & left != 0 {
                 let bit = 63 - (self.marked[word] & left).leading_zeros();
                 left = (1 << bit) - 1;
-                for &d in self.hierarchy.forest.needs.of(64 * word as u32 + bit) {
+                for d in self.hierarchy.forest.needs.of(64 * word as u32 + bit).iter() {
                     let at = d as usize / 64;
                     self.marked[at] |= u64::from(!self.front.is_applied(d)) << (d % 64);
                     low = low.min(at);
                 }
             }
         }
+        let all = self.apply_marked(low..high);
+        meter.done.splits += all;
+        meter.done.forced += all - needed;
+    }
+
+    /// Applies the splits that are marked in these words, and takes the marks away; what they depend on is applied, or among them. Returns how many they were.
+    fn apply_marked(&mut self, words: Range<usize>) -> usize {
         let mut lot = Vec::with_capacity(LOT);
         let mut all = 0;
-        for word in low..high {
+        for word in words {
             let mut bits = std::mem::take(&mut self.marked[word]);
             while bits != 0 {
                 lot.push(64 * word as u32 + bits.trailing_zeros());
@@ -183,9 +150,7 @@ impl View {
                 }
             }
         }
-        all += self.apply_lot(&lot);
-        meter.done.splits += all;
-        meter.done.forced += all - needed;
+        all + self.apply_lot(&lot)
     }
 
     #[cfg(feature = "parallel")]
@@ -213,13 +178,82 @@ impl View {
         ready.len()
     }
 
+    /// Finds the most urgent splits that there is room for, and applies them.
+    fn refine_within(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, first: &[Open]) {
+        let many = judges.next(&self.clock);
+        let h = self.hierarchy.clone();
+        let mut queue = Queue::default();
+        first.iter().for_each(|o| queue.push(*o, judges.rank(&o.entry(&h))));
+        let (mut plan, mut lot, mut done) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut faces, mut needed) = (self.face_count(), 0);
+        // All that is equally urgent at once, until there is too little room for that.
+        let mut together = true;
+        while queue.len() > 0 && !meter.is_full(faces) {
+            lot.clear();
+            queue.pop(if together { usize::MAX } else { LOT }, &mut lot);
+            lot.sort_unstable_by_key(|o: &Open| o.split);
+            done.clear();
+            if together {
+                together = self.plan(lot.iter().map(|o| o.split), &mut faces, meter, &mut plan);
+                if !together {
+                    queue.put_back(&mut lot);
+                    continue;
+                }
+                std::mem::swap(&mut lot, &mut done);
+            }
+            for (k, o) in lot.iter().enumerate() {
+                // Others may have needed it before.
+                if !self.is_marked(o.split) {
+                    if meter.is_full(faces) {
+                        meter.done.refused += lot.len() - k;
+                        break;
+                    }
+                    if !self.plan(std::iter::once(o.split), &mut faces, meter, &mut plan) {
+                        meter.done.refused += 1;
+                        continue;
+                    }
+                }
+                done.push(*o);
+            }
+            needed += done.len();
+            // Below what only others need nothing is needed, as bounds nest.
+            each_needed_below(&h, &many, &done, |o, e| queue.push(*o, judges.rank(e)));
+        }
+        meter.done.refused += queue.len();
+        let words = plan.iter().map(|&i| i as usize / 64);
+        let (low, high) = words.fold((usize::MAX, 0), |(low, high), w| (low.min(w), high.max(w + 1)));
+        meter.done.splits += self.apply_marked(low..high);
+        meter.done.forced += plan.len() - needed;
+    }
+
+    /// Marks splits and all they depend on, and counts their faces, if there is room for these; says whether there was.
+    fn plan(
+        &mut self,
+        splits: impl Iterator<Item = u32>,
+        faces: &mut usize,
+        meter: &Meter<'_>,
+        plan: &mut Vec<u32>,
+    ) -> bool {
+        let (from, room) = (plan.len(), meter.room(*faces));
+        // A split makes a face at least.
+        let fits = self.mark(splits, room, plan);
+        let more = self.faces_of(&plan[from..]);
+        if !fits || more > room {
+            self.unmark(&plan[from..]);
+            plan.truncate(from);
+            return false;
+        }
+        *faces += more;
+        true
+    }
+
     /// Applies the most urgent splits first, as long as the limits allow.
     fn refine_urgently(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, first: &[Open]) {
         let many = judges.next(&self.clock);
+        let h = self.hierarchy.clone();
         let mut queue = Queue::default();
-        first.iter().for_each(|o| queue.push(*o, judges.rank(&o.entry(&self.hierarchy))));
+        first.iter().for_each(|o| queue.push(*o, judges.rank(&o.entry(&h))));
         let (mut closure, mut lot, mut done) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut open, mut entries, mut wanted) = (Vec::new(), Vec::new(), Vec::new());
         loop {
             lot.clear();
             queue.pop(LOT, &mut lot);
@@ -248,18 +282,15 @@ impl View {
                 }
                 done.push(*o);
             }
-            open.clear();
-            entries.clear();
-            wanted.clear();
-            below(&self.hierarchy, &done, &mut open);
-            entries.extend(open.iter().map(|o| o.entry(&self.hierarchy)));
-            many.wanted(&entries, &mut wanted);
-            meter.looks += open.len();
+            meter.looks += 2 * done.len();
             // Below what only others need nothing is needed, as bounds nest.
-            for ((o, e), _) in open.iter().zip(&entries).zip(&wanted).filter(|o| *o.1) {
-                queue.push(*o, judges.rank(e));
-            }
+            each_needed_below(&h, &many, &done, |o, e| queue.push(*o, judges.rank(e)));
         }
+    }
+
+    /// Faces that splits make.
+    fn faces_of(&self, splits: &[u32]) -> usize {
+        splits.iter().map(|&i| 1 + usize::from(self.hierarchy.forest.two_faces(i))).sum()
     }
 
     /// Applies a split and all it depends on.
@@ -269,17 +300,12 @@ impl View {
         meter: &mut Meter<'_>,
         closure: &mut Vec<u32>,
     ) -> Applied {
-        closure.clear();
         // A split makes a face at least.
         let room = meter.room(self.face_count());
         let fits = self.closure(split.id, room, closure);
-        if meter.limits.faces < usize::MAX {
-            let forest = &self.hierarchy.forest;
-            let faces: usize = closure.iter().map(|&j| 1 + forest.two_faces(j) as usize).sum();
-            if !fits || faces > room {
-                meter.done.refused += 1;
-                return Applied::Refused;
-            }
+        if meter.limits.faces < usize::MAX && (!fits || self.faces_of(closure) > room) {
+            meter.done.refused += 1;
+            return Applied::Refused;
         }
         for &j in &*closure {
             if !meter.goes_on() {

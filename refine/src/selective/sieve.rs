@@ -5,7 +5,7 @@
 //! decided about by [`Lens`] itself. So what is decided is the same, to the last split. Slacks are lower by the margins, so some splits are looked at a little earlier.
 
 use super::Lens;
-use super::clock::{EYE, Found, Pace};
+use super::clock::{Found, Pace};
 use super::entry::Entry;
 use glam::{Vec3, Vec4};
 
@@ -26,12 +26,15 @@ pub(super) struct Sieve {
     steep: f32,
     slant: f32,
     near: f32,
+    floor: f32,
     /// Depth beyond which an error of 1 is fine enough.
     fine: f32,
     /// How fast that grows by the clock.
     grows: f32,
     planes: [Vec4; 6],
     back: bool,
+    /// [`Pace::eye`].
+    eye_part: f32,
     /// What coordinates are added to for the margin.
     base: f32,
     /// Slack counts less far away: by the part of the distance from the middle, from the eye, and so much more.
@@ -128,10 +131,12 @@ impl Sieve {
             steep: lens.steep as f32,
             slant: lens.slant as f32,
             near: lens.near as f32,
+            floor: lens.floor as f32,
             fine: fine as f32,
             grows: grows as f32,
             planes,
             back: lens.back,
+            eye_part: pace.eye as f32,
             base: base as f32,
             far,
         };
@@ -192,7 +197,7 @@ impl Sieve {
         let fine = error * self.fine;
         let unsure = self.steep * margin + PRODUCT * fine;
         let (low, high) = (fine - unsure, fine + unsure);
-        let depth = along.max(about).max(all(self.near));
+        let depth = along.max(about).max(all(self.near.max(self.floor)));
         let (is_fine, is_coarse) = (depth.cmpgt(high), depth.cmplt(low));
         // In the frustum?
         let inside = |n: &Vec4| p.dot(n.truncate()) + all(n.w);
@@ -227,15 +232,17 @@ impl Sieve {
         if SLACK {
             let far = (self.far[0] * p.length() + self.far[1] * away + all(self.far[2])).max(Vec4::ONE);
             let grows = error * self.grows;
-            let eye = EYE as f32;
+            let eye = self.eye_part;
             // How far depths are beyond, each by how fast it changes.
             let first = (self.steep * far + grows).recip();
             let second = (all(self.slant / eye) + grows).recip();
             let third = grows.max(all(1e-30)).recip();
-            let until_coarse =
-                ((along - high) * first).max((about - high) * second).max((all(self.near) - high) * third);
-            let until_fine =
-                ((low - along) * first).min((low - about) * second).min((low - all(self.near)) * third);
+            let until_coarse = ((along - high) * first)
+                .max((about.max(all(self.floor)) - high) * second)
+                .max((all(self.near) - high) * third);
+            let until_fine = ((low - along) * first)
+                .min((low - about.max(all(self.floor))) * second)
+                .min((low - all(self.near)) * third);
             let until_in = (-inside - margin) / far;
             let until_out = (inside - margin) / far;
             let until_front = (above - wide) * eye;

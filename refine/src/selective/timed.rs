@@ -3,7 +3,9 @@
 use super::cut::Cut;
 use super::entry::Entry;
 use super::motions::{Motions, Stage};
+use super::timed_rows::RowMotions;
 use super::{Followed, Lens, Split, View};
+use crate::aif::{MeshInput, NONE};
 use glam::DVec3;
 use std::convert::Infallible;
 
@@ -11,14 +13,16 @@ use std::convert::Infallible;
 ///
 /// New vertices begin where their ancestors are drawn. What the leader has undone stays until its vertices have moved to where their ancestor stands in the
 /// leader, and is undone then, when it cannot be seen. Changes that no lens sees are made at once. So with 1 frame, or [`TimedMorph::frames`] frames after
-/// the leader came to rest, what is drawn is the leader's mesh, with its vertices in its places bit for bit. Positions move, attributes do not.
+/// the leader came to rest, what is drawn is the leader's mesh, with its vertices in its places bit for bit. Attributes go the same way, by the rules of [`crate::Geomorph`], from those that stand for them in the one mesh to those in the other.
 ///
 /// Guaranteed: what is drawn is a mesh without cracks in every frame, with at least the leader's faces. Not guaranteed: a tolerance while vertices
-/// move. Memory: a second view, and 70 to 140 B for every vertex that moves.
+/// move. Memory: a second view, and 70 to 140 B for every vertex that moves; with attributes 100 to 200 B and their values for each of its wedges, and once for all morphs of a hierarchy 4 B a row.
 #[derive(Clone, Debug)]
 pub struct TimedMorph {
     drawn: View,
     motions: Motions,
+    /// Attributes, if there are any.
+    rows: Option<RowMotions>,
     /// The leader's splits when it was followed last.
     led: Vec<u64>,
 }
@@ -39,7 +43,8 @@ impl TimedMorph {
     /// Draws `leader` as it is. Later changes take `frames` frames, at least 1.
     pub fn new(leader: &View, frames: u32) -> TimedMorph {
         let led = leader.front.applied_bits().collect();
-        TimedMorph { drawn: leader.clone(), motions: Motions::new(frames), led }
+        let rows = RowMotions::new(&leader.hierarchy, frames.max(1));
+        TimedMorph { drawn: leader.clone(), motions: Motions::new(frames), rows, led }
     }
 
     /// Frames that a change takes.
@@ -62,6 +67,31 @@ impl TimedMorph {
         self.motions.place(v).or_else(|| self.drawn.position(v))
     }
 
+    /// The attribute values that wedge `w` is drawn with, and the channels it has; `None` if it is not drawn, or without attributes. Panics if there is no such wedge.
+    pub fn row(&self, w: u32) -> Option<(Vec<f32>, u64)> {
+        let row = Some(self.drawn.front.wedge_row(w)).filter(|&r| r != NONE)?;
+        let own = || {
+            let (values, has) = self.drawn.row(w);
+            (values.into_owned(), has)
+        };
+        Some(self.rows.as_ref().and_then(|m| m.value(&self.drawn.hierarchy, row)).unwrap_or_else(own))
+    }
+
+    /// Every vertex is drawn where the mesh has it, and with its own attributes.
+    pub fn is_at_rest(&self) -> bool {
+        self.motions.len() == 0 && self.rows.as_ref().is_none_or(RowMotions::is_empty)
+    }
+
+    /// The mesh that is drawn as flat arrays: as [`View::to_input`], with vertices and attributes as they are on their way. O(n).
+    pub fn to_input(&self) -> MeshInput {
+        let places: Vec<_> = self.displaced().collect();
+        let mut out = self.drawn.input(self.is_at_rest(), |w| {
+            self.row(w).map_or_else(|| self.drawn.own_row(w), |(row, has)| (row.into(), has))
+        });
+        self.drawn.put(&mut out, &places);
+        out
+    }
+
     /// The vertices that are drawn elsewhere than the mesh has them, ascending, and where.
     pub fn displaced(&self) -> impl ExactSizeIterator<Item = (u32, DVec3)> + '_ {
         self.motions.all()
@@ -71,8 +101,10 @@ impl TimedMorph {
     pub fn follow(&mut self, leader: &View, lenses: &[Lens]) -> Followed {
         let now: Vec<u64> = leader.front.applied_bits().collect();
         let before = std::mem::replace(&mut self.led, now);
-        let mut both = Both { drawn: &mut self.drawn, led: &self.led, before: &before };
+        let mut both = Both { drawn: &mut self.drawn, rows: &mut self.rows, led: &self.led, before: &before };
         let Ok(done) = self.motions.follow(&mut both, lenses);
+        self.rows.iter_mut().for_each(RowMotions::settle);
+        self.drawn.front.settle();
         done
     }
 }
@@ -80,6 +112,7 @@ impl TimedMorph {
 /// What is drawn, and what was and is asked for, a bit a split.
 struct Both<'a> {
     drawn: &'a mut View,
+    rows: &'a mut Option<RowMotions>,
     led: &'a [u64],
     before: &'a [u64],
 }
@@ -134,16 +167,38 @@ impl Stage for Both<'_> {
     }
 
     fn is_free(&self, i: u32) -> bool {
-        self.drawn.is_free(i)
+        self.drawn.is_free(i) && self.rows.as_ref().is_none_or(|r| r.is_at_rest(&self.drawn.hierarchy, i))
     }
 
     fn draw(&mut self, i: u32) -> Result<(), Infallible> {
+        if let Some(rows) = &mut self.rows {
+            rows.begin(&self.drawn.hierarchy, i);
+        }
         self.drawn.apply(&Split::new(i));
         Ok(())
     }
 
     fn undraw(&mut self, i: u32) -> Result<(), Infallible> {
-        self.drawn.undo(i);
+        self.drawn.undo(i, &mut Vec::new());
+        if let Some(rows) = &mut self.rows {
+            rows.end(&self.drawn.hierarchy, i);
+        }
         Ok(())
+    }
+
+    fn send_more(&mut self, changed: &[u32], lenses: &[Lens]) {
+        if changed.is_empty() {
+            return;
+        }
+        let Some(mut rows) = self.rows.take() else { return };
+        // What lingers may have to go farther up, or not so far.
+        let mut splits = self.lingering();
+        splits.extend(changed.iter().filter(|&&i| self.is_led(i)));
+        rows.send(&self.drawn.hierarchy, &splits, self, lenses);
+        *self.rows = Some(rows);
+    }
+
+    fn step_more(&mut self) {
+        self.rows.iter_mut().for_each(RowMotions::step);
     }
 }

@@ -78,8 +78,8 @@ impl TrulyView {
                 let w = pieces.wedge(f, k, applied);
                 let row = pieces.row(w, applied) as usize;
                 let present = streams.present[row];
-                let values = &streams.rows[row * streams.stride..(row + 1) * streams.stride];
-                let new = *number.entry(w).or_insert_with(|| wedges.push(values, present));
+                let values = streams.rows.row(row, streams.stride);
+                let new = *number.entry(w).or_insert_with(|| wedges.push(&values, present));
                 wedges.corner.push(if present == 0 { NONE } else { new });
             }
             out.wedges = Some(wedges);

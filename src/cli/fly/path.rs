@@ -23,10 +23,10 @@ pub(super) struct PathArgs {
     #[arg(long, value_name = "PATH")]
     path: String,
     /// Frames of a circle or a lemniscate; of a file at most so many [default: 600, or all of the file]
-    #[arg(long, value_name = "N", value_parser = args::positive, allow_negative_numbers = true, help_heading = "Path")]
+    #[arg(long, value_name = "N", value_parser = frames, allow_negative_numbers = true, help_heading = "Path")]
     frames: Option<usize>,
     /// Factor for the eye's coordinates of a file of `F` lines, which are of a terrain of side 1 [default: 1; with --grid its longer side]
-    #[arg(long, value_name = "S", value_parser = args::not_negative, allow_negative_numbers = true, help_heading = "Path")]
+    #[arg(long, value_name = "S", value_parser = factor, allow_negative_numbers = true, help_heading = "Path")]
     path_scale: Option<f64>,
     /// With --grid: samples a frame: slow (0.1 on a circle, 0.22 on a lemniscate), fast (1 and 2.2), or a number [default: slow]
     #[arg(long, value_name = "SPEED", value_parser = speed, requires = "grid", help_heading = "Path")]
@@ -72,6 +72,16 @@ pub(super) struct Course<'a> {
 const FRAMES: usize = 600;
 /// The part of the grid's sides that a mesh made of it takes up at least.
 const MOST_OF_IT: f64 = 0.5;
+
+/// Cameras and figures of all frames are held until the flight is over.
+const MOST_FRAMES: usize = 100_000;
+
+fn frames(text: &str) -> Result<usize, String> {
+    args::positive(text).and_then(|n| match n {
+        n if n <= MOST_FRAMES => Ok(n),
+        _ => Err(format!("must be 1 to {MOST_FRAMES}; fly a longer path in parts")),
+    })
+}
 
 fn factor(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
@@ -225,5 +235,7 @@ mod tests {
         assert!(speed("0").is_err() && speed("x").is_err() && speed("inf").is_err());
         assert_eq!((spacing("30"), spacing("30,25.5")), (Ok([30.0; 2]), Ok([30.0, 25.5])));
         assert!(spacing("30,0").is_err() && factor("nan").is_err());
+        assert_eq!((frames("1"), frames("1e5")), (Ok(1), Ok(MOST_FRAMES)));
+        assert!(frames("0").is_err() && frames("100001").is_err());
     }
 }

@@ -159,7 +159,7 @@ impl Args {
     /// What finished blocks belong to: grid, options that change them, and this version.
     fn belongs(&self, source: &GridFile) -> Result<String, Failure> {
         Ok(format!(
-            "progmesh {} terrain build, blocks 3\n{}\n{} x {}, {:?}\nfloor {:?} block {} memory {}\n",
+            "progmesh {} terrain build, blocks 4\n{}\n{} x {}, {:?}\nfloor {:?} block {} memory {}\n",
             env!("CARGO_PKG_VERSION"),
             self.input.identity()?,
             source.raster.columns(),

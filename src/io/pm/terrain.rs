@@ -97,7 +97,7 @@ pub fn write_terrain(
     for node in &mut scene.nodes {
         node.transform = DMat4::from_translation(origin) * DMat4::from_scale(DVec3::splat(x));
     }
-    let shell = write_shell(&shell_of(scene), &[], &[]);
+    let shell = write_shell(&shell_of(scene), &[], &[Some(coded.extent())]);
     coded.write(&shell, &[(ChunkType::TERRAIN, terrain.to_bytes())], out)
 }
 

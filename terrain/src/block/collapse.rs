@@ -1,10 +1,10 @@
-//! Half-edge collapses, the cheapest first by the exact error of the triangles that come of it (Hoppe 1998).
+//! Half-edge collapses, the cheapest first, about, by the exact error of the triangles that come of it (Hoppe 1998).
 
 use super::NONE;
 use super::history::{Forms, History, up};
-use super::relief::Relief;
+use super::relief::{Gauge, Relief};
 use super::sheet::{Sheet, Vertex};
-use super::surface::{Ring, Surface, Wing, next, previous};
+use super::surface::{Ring, Surface, Wing};
 use crate::tin::scan::area;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -67,27 +67,39 @@ enum Kind {
     Locked,
 }
 
-/// No vertex gets more neighbours.
-const VALENCE: usize = 20;
+/// What a collapse may make of a vertex's neighbours, but for regular rings, which add few.
+const VALENCE: u32 = 20;
+
+/// Faces looked at together.
+const LANES: usize = 4;
+
+/// Parts along each side of a block. What is known of a whole one is some 5 MB: more than a core's own cache holds.
+const PARTS: usize = 4;
+/// In each part in turn goes what costs at most so much times the least of all. On windows of Grand Canyon, ETOPO5 and a generated landscape meshes of the same error have within 1 % as many faces as
+/// where the cheapest of all is always the next.
+const STEP: f32 = 1.25;
 
 /// A candidate: bits of its cost, then the square of its length, then the vertex. All costs are positive, so bits are in their order.
 type Candidate = Reverse<(u32, u32, u32)>;
 
 struct Work<'a> {
-    relief: &'a Relief,
+    gauge: Gauge<'a>,
     vertices: &'a [Vertex],
     surface: Surface,
     kind: Vec<Kind>,
     history: History,
-    queue: BinaryHeap<Candidate>,
+    /// Candidates by parts of the block: those of a part are worked on together, so that what lies around them stays in the processor's cache.
+    queues: Vec<BinaryHeap<Candidate>>,
+    /// The part that each vertex lies in.
+    part: Vec<u8>,
     /// Where each vertex would go; [`NONE`] for nowhere.
     goal: Vec<u32>,
     /// The error of what would come of it.
     price: Vec<f32>,
     /// Something around it changed since the goal was found.
     stale: Vec<bool>,
-    mark: Vec<u32>,
-    stamp: u32,
+    /// How many faces each has.
+    fan: Vec<u32>,
     ring: Ring,
     other: Ring,
     star: Star,
@@ -96,17 +108,37 @@ struct Work<'a> {
     bars: Vec<(u32, u32)>,
 }
 
-/// The ring of a vertex as seen from it. Of a closed ring everything is there twice in a row, so that the faces that stay are one run wherever that begins.
+/// The ring of a vertex as seen from it; of a closed ring the first neighbour comes once more at the end. The last is repeated, with faces of no area, until there are whole groups of [`LANES`] faces. Columns and rows are whole numbers, and so small that products of two are exact.
 #[derive(Clone, Debug, Default)]
 struct Star {
     /// Columns and rows from the vertex to its neighbours.
-    at: Vec<[i64; 2]>,
-    /// Twice the areas of the faces, each with the neighbour at which it begins.
-    areas: Vec<i64>,
+    x: Vec<f64>,
+    y: Vec<f64>,
     /// Heights of the neighbours.
-    heights: Vec<f64>,
-    /// What it takes at least to go to a neighbour, which, and the face over the vertex then.
-    ways: Vec<(f64, usize, usize)>,
+    z: Vec<f64>,
+    /// Twice the areas of the faces, each with the neighbour at which it begins.
+    areas: Vec<f64>,
+    /// Twice the areas of the triangles from the neighbour last looked at over the vertex to the others.
+    beside: Vec<f64>,
+    ways: Vec<Way>,
+    /// No sample but the vertex lies between the neighbours.
+    alone: bool,
+}
+
+impl Star {
+    /// Six neighbours as in a full grid, each with its opposite, and no sample between: wherever the vertex goes it lies halfway between these two, and all faces lie the right way round.
+    fn is_regular(&self, ring: &Ring) -> bool {
+        let opposite = |of: &[f64]| (0..3).all(|k| of[k] + of[k + 3] == 0.0);
+        !ring.border && ring.sides.len() == 6 && opposite(&self.x) && opposite(&self.y)
+    }
+}
+
+/// A neighbour to go to: its number, the error at the vertex then, and the face over it.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    least: f64,
+    to: usize,
+    over: usize,
 }
 
 /// What collapsing a block gave.
@@ -126,17 +158,17 @@ pub(super) fn collapse(mut sheet: Sheet, relief: &Relief, rules: &Rules) -> Opti
     let n = sheet.vertices.len();
     let surface = Surface::new(&sheet.faces, n)?;
     let mut work = Work {
-        relief,
+        gauge: Gauge::new(relief),
         kind: vec![Kind::Free; n],
         vertices: &sheet.vertices,
         surface,
         history,
-        queue: BinaryHeap::with_capacity(n),
+        queues: vec![BinaryHeap::new(); PARTS * PARTS],
+        part: parts(&sheet.vertices),
         goal: vec![NONE; n],
         price: vec![0.0; n],
         stale: vec![false; n],
-        mark: vec![0; n],
-        stamp: 0,
+        fan: vec![0; n],
         ring: Ring::default(),
         other: Ring::default(),
         star: Star::default(),
@@ -163,17 +195,23 @@ pub(super) fn collapse(mut sheet: Sheet, relief: &Relief, rules: &Rules) -> Opti
     Some(Collapsed { collapses, vertices, faces, sheet: left })
 }
 
-/// Twice the area of a triangle from the origin to two places.
-#[inline]
-fn cross(a: [i64; 2], b: [i64; 2]) -> i64 {
-    a[0] * b[1] - a[1] * b[0]
+/// The part of the block that each vertex lies in.
+fn parts(vertices: &[Vertex]) -> Vec<u8> {
+    let extent = |of: fn(&Vertex) -> i32| {
+        let all = || vertices.iter().map(of);
+        (all().min().unwrap_or(0), all().max().unwrap_or(0))
+    };
+    let (columns, rows) = (extent(|v| v.x), extent(|v| v.y));
+    let along = |at: i32, (first, last): (i32, i32)| {
+        (i64::from(at - first) * PARTS as i64 / (i64::from(last - first) + 1)) as usize
+    };
+    vertices.iter().map(|v| (along(v.y, rows) * PARTS + along(v.x, columns)) as u8).collect()
 }
 
 impl Work<'_> {
     fn classify(&mut self, faces: &[[u32; 3]], rules: &Rules) {
         let n = self.vertices.len();
-        let mut count = vec![0u32; n];
-        faces.as_flattened().iter().for_each(|&v| count[v as usize] += 1);
+        faces.as_flattened().iter().for_each(|&v| self.fan[v as usize] += 1);
         let mut ring = Ring::default();
         for v in 0..n as u32 {
             let at = self.vertices[v as usize];
@@ -182,7 +220,7 @@ impl Work<'_> {
                 continue;
             }
             self.surface.ring(v, &mut ring);
-            if ring.sides.len() != count[v as usize] as usize {
+            if ring.sides.len() != self.fan[v as usize] as usize {
                 self.kind[v as usize] = Kind::Locked;
             } else if let (true, &[first, .., last]) = (ring.border, &ring.neighbours[..]) {
                 let [p, q] = [first, last].map(|v| self.vertices[v as usize]);
@@ -197,28 +235,42 @@ impl Work<'_> {
         for u in 0..self.vertices.len() as u32 {
             self.evaluate(u, None);
         }
-        let mut collapses = vec![];
-        let (mut forms, mut inner) = (Forms::default(), vec![]);
-        while collapses.len() < most {
-            let Some(Reverse((cost, _, u))) = self.queue.pop() else { break };
-            if self.surface.at[u as usize] == NONE || self.goal[u as usize] == NONE {
-                continue;
-            }
-            if self.stale[u as usize] && !self.evaluate(u, Some(cost)) {
-                continue;
-            }
-            match self.commit(u, (&mut forms, &mut inner)) {
-                Some(collapse) => collapses.push(collapse),
-                // Elsewhere, perhaps.
-                None => {
-                    let v = std::mem::replace(&mut self.goal[u as usize], NONE);
-                    let list = std::mem::replace(&mut self.barred[u as usize], self.bars.len() as u32);
-                    self.bars.push((v, list));
-                    self.evaluate(u, None);
+        let mut collapses = Vec::with_capacity(most.min(self.vertices.len()));
+        let mut spare = (Forms::default(), vec![]);
+        while collapses.len() < most
+            && let Some(least) = self.queues.iter().filter_map(|q| Some(q.peek()?.0.0)).min()
+        {
+            let enough = (f32::from_bits(least) * STEP).to_bits();
+            for part in 0..self.queues.len() {
+                let due = |c: &Candidate| c.0.0 <= enough;
+                while collapses.len() < most
+                    && self.queues[part].peek().is_some_and(due)
+                    && let Some(Reverse((_, _, u))) = self.queues[part].pop()
+                {
+                    collapses.extend(self.take(u, enough, &mut spare));
                 }
             }
         }
         collapses
+    }
+
+    /// Makes the collapse of `u`, whose turn it is with these bits of a cost, unless it is out of date.
+    fn take(&mut self, u: u32, cost: u32, spare: &mut (Forms, Vec<(u32, usize)>)) -> Option<Collapse> {
+        if self.surface.at[u as usize] == NONE || self.goal[u as usize] == NONE {
+            return None;
+        }
+        if self.stale[u as usize] && !self.evaluate(u, Some(cost)) {
+            return None;
+        }
+        let made = self.commit(u, (&mut spare.0, &mut spare.1));
+        if made.is_none() {
+            // Elsewhere, perhaps.
+            let v = std::mem::replace(&mut self.goal[u as usize], NONE);
+            let list = std::mem::replace(&mut self.barred[u as usize], self.bars.len() as u32);
+            self.bars.push((v, list));
+            self.evaluate(u, None);
+        }
+        made
     }
 
     /// Makes the collapse that `u` waits for, unless a face would turn over in some order of refinement.
@@ -234,8 +286,17 @@ impl Work<'_> {
             self.ring = ring;
             return None;
         }
-        let j = self.history.accept(self.relief, self.vertices, [u, v], self.price[u as usize], forms);
+        let j = self.history.accept(&mut self.gauge, self.vertices, [u, v], self.price[u as usize], forms);
         let wings = self.surface.collapse(u, i, &ring);
+        // A face goes on each side where there is one, and with it one of that tip's.
+        self.fan[v as usize] += self.fan[u as usize];
+        let n = ring.neighbours.len();
+        let before = i.checked_sub(1).or((!ring.border).then_some(n - 1));
+        let after = if i + 1 < n { Some(i + 1) } else { (!ring.border).then_some(0) };
+        for k in [before, after].into_iter().flatten() {
+            self.fan[v as usize] -= 2;
+            self.fan[ring.neighbours[k] as usize] -= 1;
+        }
         let [from, to] = [u, v].map(|v| self.vertices[v as usize]);
         self.history.bury(wings, from, to);
         for &side in &ring.sides {
@@ -281,8 +342,6 @@ impl Work<'_> {
         }
         let mut ring = std::mem::take(&mut self.other);
         self.surface.ring(u, &mut ring);
-        self.stamp += 1;
-        ring.neighbours.iter().for_each(|&n| self.mark[n as usize] = self.stamp);
         self.look(u, &ring);
         let at_once = self.choose(u, before, known, &ring);
         self.other = ring;
@@ -292,11 +351,25 @@ impl Work<'_> {
     /// As [`Work::evaluate`], with its ring looked at.
     fn choose(&mut self, u: u32, before: u32, known: Option<u32>, ring: &Ring) -> bool {
         let (mut best, mut found) = ((f64::INFINITY, u32::MAX), NONE);
+        if before == NONE && self.star.alone && self.star.is_regular(ring) {
+            let here = f64::from(self.vertices[u as usize].z);
+            for i in 0..ring.neighbours.len() {
+                let v = ring.neighbours[i];
+                let Star { x, y, z, .. } = &self.star;
+                let cost = (0.5 * (z[i % 3] + z[i % 3 + 3]) - here).abs() + self.gauge.allowance();
+                let cost = (cost, (x[i] * x[i] + y[i] * y[i]) as u32);
+                if (cost, v) < (best, found) && self.may_go(u, v) {
+                    (best, found) = (cost, v);
+                }
+            }
+            self.wait(u, best, found);
+            return false;
+        }
         // What was the best before is so again more often than not, and spares most of the work for the others.
-        let first = ring.neighbours.iter().position(|&n| n == before);
+        let first = if before == NONE { None } else { ring.neighbours.iter().position(|&n| n == before) };
         if let Some(i) = first
-            && let Some((_, over)) = self.least(u, i, ring)
-            && let Some(cost) = self.cost(u, (i, over), ring, (best, found))
+            && let Some(way) = self.way(u, i, ring)
+            && let Some(cost) = self.cost(u, way, ring, (best, found))
         {
             (best, found) = (cost, before);
             if known.is_some_and(|k| (cost.0 as f32).to_bits() <= k) {
@@ -309,56 +382,59 @@ impl Work<'_> {
         let mut ways = std::mem::take(&mut self.star.ways);
         ways.clear();
         for i in (0..ring.neighbours.len()).filter(|&i| Some(i) != first) {
-            let least = self.least(u, i, ring).filter(|(least, _)| *least <= best.0);
-            ways.extend(least.map(|(least, over)| (least, i, over)));
+            ways.extend(self.way(u, i, ring).filter(|way| way.least <= best.0));
         }
-        ways.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for &(least, i, over) in &ways {
-            if least > best.0 {
+        ways.sort_unstable_by(|a, b| a.least.total_cmp(&b.least).then(a.to.cmp(&b.to)));
+        for &way in &ways {
+            if way.least > best.0 {
                 break;
             }
-            if let Some(cost) = self.cost(u, (i, over), ring, (best, found)) {
-                (best, found) = (cost, ring.neighbours[i]);
+            if let Some(cost) = self.cost(u, way, ring, (best, found)) {
+                (best, found) = (cost, ring.neighbours[way.to]);
             }
         }
         self.star.ways = ways;
-        if found != NONE {
-            self.goal[u as usize] = found;
-            self.price[u as usize] = up(best.0);
-            self.queue.push(Reverse(((best.0 as f32).to_bits(), best.1, u)));
-        }
+        self.wait(u, best, found);
         false
+    }
+
+    /// Puts a vertex into the queue that goes to another at this cost, if there is one.
+    fn wait(&mut self, u: u32, cost: (f64, u32), goal: u32) {
+        if goal != NONE {
+            self.goal[u as usize] = goal;
+            self.price[u as usize] = up(cost.0);
+            self.queues[usize::from(self.part[u as usize])].push(Reverse((
+                (cost.0 as f32).to_bits(),
+                cost.1,
+                u,
+            )));
+        }
     }
 
     /// Looks at the ring of `u` from there.
     fn look(&mut self, u: u32, ring: &Ring) {
         let here = self.vertices[u as usize];
-        let Star { at, areas, heights, .. } = &mut self.star;
-        at.clear();
-        heights.clear();
-        for &n in &ring.neighbours {
-            let v = self.vertices[n as usize];
-            at.push([i64::from(v.x) - i64::from(here.x), i64::from(v.y) - i64::from(here.y)]);
-            heights.push(f64::from(v.z));
+        let Star { x, y, z, areas, beside, alone, .. } = &mut self.star;
+        for all in [&mut *x, &mut *y, &mut *z] {
+            all.clear();
         }
-        if !ring.border {
-            at.extend_from_within(..);
-            heights.extend_from_within(..);
+        let again = if ring.border { None } else { ring.neighbours.first() };
+        for &n in ring.neighbours.iter().chain(again) {
+            let v = self.vertices[n as usize];
+            x.push(f64::from(v.x - here.x));
+            y.push(f64::from(v.y - here.y));
+            z.push(f64::from(v.z));
+        }
+        let faces = ring.sides.len();
+        let padded = faces.next_multiple_of(LANES);
+        for all in [&mut *x, &mut *y] {
+            all.resize(padded + 1, all.last().copied().unwrap_or(0.0));
         }
         areas.clear();
-        areas.extend(at.windows(2).map(|w| cross(w[0], w[1])));
-    }
-
-    /// The faces that stay when `u` goes to neighbour number `i`: the first and how many follow it, counted on around a closed ring.
-    #[inline]
-    fn staying(ring: &Ring, i: usize) -> (usize, usize) {
-        let faces = ring.sides.len();
-        // Those behind the one that begins at the neighbour, and before the one that ends there.
-        match (ring.border, i) {
-            (true, 0) => (1, faces.saturating_sub(1)),
-            (true, _) => (0, faces.saturating_sub(1)),
-            (false, _) => (i + 1, faces.saturating_sub(2)),
-        }
+        areas.extend(x.windows(2).zip(y.windows(2)).map(|(x, y)| x[0] * y[1] - y[0] * x[1]));
+        beside.resize(padded + 1, 0.0);
+        // Pick's theorem.
+        *alone = self.gauge.is_fine() && areas.iter().sum::<f64>() == faces as f64;
     }
 
     /// Whether `u` must not go to `v` for the time being.
@@ -373,94 +449,92 @@ impl Work<'_> {
         false
     }
 
-    /// The error at `u` itself if it goes to its neighbour number `i`, and the face it lies in then; `None` if it must not, as far as faces tell that.
-    fn least(&self, u: u32, i: usize, ring: &Ring) -> Option<(f64, usize)> {
-        let v = ring.neighbours[i];
-        if self.kind[v as usize] == Kind::Locked || self.is_barred(u, v) {
-            return None;
-        }
-        let Star { at, areas, heights, .. } = &self.star;
-        let to = at[i];
-        let n = ring.neighbours.len();
-        // Along the border only, and straight on.
-        if ring.border && ((i > 0 && i < n - 1) || cross(at[n - 1 - i], to) != 0) {
-            return None;
-        }
-        let (first, count) = Self::staying(ring, i);
-        let mut over = None;
-        let (ends, own) = (at.get(first..=first + count)?, areas.get(first..first + count)?);
-        let mut c = cross(to, ends[0]);
-        for (k, (end, &face)) in ends[1..].iter().zip(own).enumerate() {
-            // Weights are the areas opposite the corners.
-            let (b, next) = (c, cross(to, *end));
-            c = next;
-            let area = face + b - c;
-            if area <= 0 {
-                return None;
-            }
-            // The vertex lies in this face.
-            if b >= 0 && c <= 0 {
-                over = Some((k, b, c, area));
-            }
-        }
-        let (k, b, c, area) = over.unwrap_or((0, 0, 0, 1));
-        let k = first + k;
-        let mut least = 0.0;
-        if over.is_some() {
-            let sum = areas[k] as f64 * heights[i] - c as f64 * heights[k] + b as f64 * heights[k + 1];
-            least = (sum / area as f64 - f64::from(self.vertices[u as usize].z)).abs();
-        }
-        Some((least, k))
+    /// Whether `u` may go to its neighbour `v` as far as the two tell.
+    #[inline]
+    fn may_go(&self, u: u32, v: u32) -> bool {
+        self.kind[v as usize] != Kind::Locked && !self.is_barred(u, v)
     }
 
-    /// Error and squared length of taking `u` to its neighbour number `i`, where faces allow that; `None` if it is not legal, or not less than what is known. `over` is the face that
-    /// it then lies in.
+    /// What there is to know of `u` going to its neighbour number `i` before triangles are measured; `None` if it must not, as far as faces tell that.
+    #[inline]
+    fn way(&mut self, u: u32, i: usize, ring: &Ring) -> Option<Way> {
+        let v = ring.neighbours[i];
+        if !self.may_go(u, v) {
+            return None;
+        }
+        let Star { x, y, z, areas, beside, .. } = &mut self.star;
+        let (faces, padded) = (ring.sides.len(), areas.len());
+        let (x, y, beside) = (&x[..=padded], &y[..=padded], &mut beside[..=padded]);
+        let (to_x, to_y) = (x[i], y[i]);
+        // Along the border only, and straight on.
+        if ring.border && (i > 0 && i < faces || x[faces - i] * to_y != y[faces - i] * to_x) {
+            return None;
+        }
+        beside[padded] = to_x * y[padded] - to_y * x[padded];
+        let groups = beside
+            .as_chunks_mut::<LANES>()
+            .0
+            .iter_mut()
+            .zip(x.as_chunks::<LANES>().0)
+            .zip(y.as_chunks::<LANES>().0);
+        for ((beside, x), y) in groups {
+            for k in 0..LANES {
+                beside[k] = to_x * y[k] - to_y * x[k];
+            }
+        }
+        // The faces that go have no area there, all others must have one.
+        let mut right = [0.0; LANES];
+        let (firsts, seconds) = (beside.as_chunks::<LANES>().0, beside[1..].as_chunks::<LANES>().0);
+        for ((face, b), c) in areas.as_chunks::<LANES>().0.iter().zip(firsts).zip(seconds) {
+            for k in 0..LANES {
+                right[k] += if face[k] + b[k] - c[k] > 0.0 { 1.0 } else { 0.0 };
+            }
+        }
+        if right.iter().sum::<f64>() != (faces - ring.dying()) as f64 {
+            return None;
+        }
+        // The vertex lies in this face: weights are the areas opposite the corners.
+        let over = beside
+            .windows(2)
+            .zip(&*areas)
+            .position(|(b, face)| b[0] >= 0.0 && b[1] <= 0.0 && face + b[0] - b[1] > 0.0)?;
+        let (face, b, c) = (areas[over], beside[over], beside[over + 1]);
+        let height = (face * z[i] - c * z[over] + b * z[over + 1]) / (face + b - c);
+        let least = (height - f64::from(self.vertices[u as usize].z)).abs();
+        Some(Way { least, to: i, over })
+    }
+
+    /// Error and squared length of taking `u` to its neighbour number `i`, where faces allow that; `None` if it has too many neighbours then, or that is not less than what is known.
+    ///
+    /// The link condition needs no test: where all faces that stay lie the right way round, the way from `v` to any other neighbour goes through faces of `u`, so there is no other edge between them.
     fn cost(
-        &self,
+        &mut self,
         u: u32,
-        (i, over): (usize, usize),
+        Way { least, to: i, over }: Way,
         ring: &Ring,
         known: ((f64, u32), u32),
     ) -> Option<(f64, u32)> {
         let v = ring.neighbours[i];
-        let n = ring.neighbours.len();
+        let (n, faces, wings) = (ring.neighbours.len(), ring.sides.len(), ring.dying() as u32);
+        let (own, more) = (self.fan[v as usize], self.fan[u as usize]);
+        if own + more > VALENCE + 2 * wings && own > 6 {
+            return None;
+        }
         let (at, to) = (self.vertices[u as usize], self.vertices[v as usize]);
         let enough = known.0.0;
-        let mut most = 0.0f64;
-        let (first, count) = Self::staying(ring, i);
+        let mut most = if self.star.alone { least + self.gauge.allowance() } else { 0.0 };
+        let goes = |k: usize| k == i || k + 1 == i || i == 0 && !ring.border && k + 1 == faces;
         // The face over the vertex is the likeliest to be too far off.
-        for k in std::iter::once(over).chain((first..first + count).filter(|&k| k != over)).take(count) {
-            let corner = |k: usize| self.vertices[ring.neighbours[if k >= n { k - n } else { k }] as usize];
-            most = most.max(self.relief.error([to, corner(k), corner(k + 1)], enough));
+        let all = std::iter::once(over).chain((0..faces).filter(|&k| k != over && !goes(k)));
+        for k in all.take(if self.star.alone { 0 } else { faces }) {
+            let corner = |k: usize| self.vertices[ring.neighbours[if k == n { 0 } else { k }] as usize];
+            most = most.max(self.gauge.error([to, corner(k), corner(k + 1)], enough));
             if most > enough {
                 return None;
             }
         }
         let (dx, dy) = (i64::from(to.x - at.x), i64::from(to.y - at.y));
         let cost = (most, u32::try_from(dx * dx + dy * dy).unwrap_or(u32::MAX));
-        // Last, as most are too dear.
-        let wings = if ring.border { 1 } else { 2 };
-        ((cost, v) < known && self.links(v, wings, ring.sides.len())).then_some(cost)
-    }
-
-    /// The link condition: `v` and the marked vertex have no neighbours in common but the tips of their faces. Also the limit of neighbours.
-    fn links(&self, v: u32, wings: usize, faces: usize) -> bool {
-        let first = self.surface.at[v as usize];
-        let (mut common, mut own, mut s) = (0, 0, first);
-        let mut see = |n: u32| common += usize::from(self.mark[n as usize] == self.stamp);
-        loop {
-            own += 1;
-            see(self.surface.corner[next(s) as usize]);
-            let before = previous(s);
-            s = self.surface.across[before as usize];
-            if s == NONE {
-                see(self.surface.corner[before as usize]);
-                break;
-            }
-            if s == first {
-                break;
-            }
-        }
-        common == wings && (own + faces <= VALENCE + 2 * wings || own <= 6)
+        ((cost, v) < known).then_some(cost)
     }
 }

@@ -1,7 +1,7 @@
 //! What corners were before, what collapses depend on, and the bounds that follow.
 
 use super::NONE;
-use super::relief::Relief;
+use super::relief::Gauge;
 use super::sheet::{Former, Gone, Round, Sheet, Vertex, square};
 use super::surface::{Ring, Surface, Wing, next, previous};
 use crate::tin::scan::area;
@@ -27,6 +27,8 @@ pub(super) struct History {
     last: Vec<u32>,
     /// What every collapse, those of the past first, needs as a split, as far as it is known yet.
     needs: Vec<[u32; 3]>,
+    /// The latest collapse that each of them was found to need at once.
+    user_of: Vec<u32>,
     bounds: Vec<f32>,
     /// Of every vertex: what holds all that came of it and is around that, and how steep that is; see [`Round`].
     round: Vec<Round>,
@@ -86,11 +88,19 @@ impl History {
             joined: std::mem::take(&mut sheet.joined).into_flattened(),
             last: std::mem::take(&mut sheet.last),
             needs: vec![[NONE; 3]; sheet.past.len()],
+            user_of: vec![NONE; sheet.past.len()],
             bounds: std::mem::take(&mut sheet.past),
             round: std::mem::take(&mut sheet.round),
             ..History::default()
         };
-        h.entries.reserve(sheet.former.len());
+        // What collapses of three vertices of four add, about.
+        let (faces, n) = (sheet.faces.len(), sheet.vertices.len());
+        h.entries.reserve(sheet.former.len() + 3 * n);
+        h.stills.reserve(sheet.gone.len() + faces);
+        h.open.reserve(3 * faces);
+        h.needs.reserve(n);
+        h.user_of.reserve(n);
+        h.bounds.reserve(n);
         let mut former = std::mem::take(&mut sheet.former).into_iter();
         for count in std::mem::take(&mut sheet.counts).into_flattened() {
             let head = h.take_chain(&mut former, count);
@@ -114,6 +124,9 @@ impl History {
 
     /// Takes so many former vertices as a chain; returns where it begins.
     fn take_chain(&mut self, former: &mut impl Iterator<Item = Former>, count: u32) -> u32 {
+        if count == 0 {
+            return NONE;
+        }
         let first = self.entries.len() as u32;
         self.entries.extend(former.take(count as usize).zip(first + 1..));
         match self.entries[first as usize..].last_mut() {
@@ -130,15 +143,16 @@ impl History {
         if i == NONE {
             return;
         }
+        self.user_of[i as usize] = j;
         if let Some(slot) = self.needs[i as usize].iter_mut().find(|s| **s == NONE || **s == j) {
             *slot = j;
         }
     }
 
-    /// Split `i` surely cannot be made without `j`.
+    /// Split `i` surely cannot be made without the latest, `j`, which is not `i`.
     fn depends(&self, i: u32, j: u32, depth: u32) -> bool {
-        i == j
-            || depth > 0 && self.needs[i as usize].iter().any(|&d| d != NONE && self.depends(d, j, depth - 1))
+        let needs = || self.needs[i as usize].iter().take_while(|d| **d != NONE);
+        self.user_of[i as usize] == j || depth > 1 && needs().any(|&d| self.depends(d, j, depth - 1))
     }
 
     /// Looks at what comes of a collapse of `u` to its neighbour number `i`, before it is made; `ring` is that of `u`, `inner` its sides that stay. True, and its split is noted as the next, if all faces lie the
@@ -163,6 +177,7 @@ impl History {
         forms.users = [self.last[v as usize], self.last[u as usize], a, b, c, d, e, f];
         let j = self.needs.len() as u32;
         self.needs.push([NONE; 3]);
+        self.user_of.push(NONE);
         forms.users.into_iter().for_each(|i| self.need(i, j));
         self.fill((surface, vertices), (ring, inner), dies, j, forms);
         if forms.turn_about(vertices[v as usize]) {
@@ -170,8 +185,10 @@ impl History {
         }
         for i in forms.users.into_iter().filter(|&i| i != NONE) {
             self.needs[i as usize].iter_mut().filter(|s| **s == j).for_each(|s| *s = NONE);
+            self.user_of[i as usize] = NONE;
         }
         self.needs.pop();
+        self.user_of.pop();
         false
     }
 
@@ -212,7 +229,7 @@ impl History {
     /// Makes the collapse that was proposed, of `u` to `v`: what comes of it is within `error`, as the faces are now. Measures what else they may be.
     pub(super) fn accept(
         &mut self,
-        relief: &Relief,
+        gauge: &mut Gauge<'_>,
         vertices: &[Vertex],
         [u, v]: [u32; 2],
         error: f32,
@@ -226,13 +243,13 @@ impl History {
         for (k, [second, third]) in forms.faces().enumerate() {
             far = second.iter().chain(third).map(|&b| square(a, b, self.scale)).fold(far, f64::max);
             if second.len() * third.len() > MOST {
-                most = most.max(relief.span(second.iter().chain(third).copied().chain([a])));
+                most = most.max(gauge.span(second.iter().chain(third).copied().chain([a])));
                 continue;
             }
             for (i, &b) in second.iter().enumerate() {
                 let skip = usize::from(k < forms.live && i == 0);
                 for &c in &third[skip..] {
-                    most = most.max(relief.error([a, b, c], f64::INFINITY));
+                    most = most.max(gauge.error([a, b, c], f64::INFINITY));
                 }
             }
         }

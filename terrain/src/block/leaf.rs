@@ -2,7 +2,7 @@
 
 use super::collapse::{Rules, collapse};
 use super::join::Block;
-use super::relief::Relief;
+use super::relief::{Gauge, Relief};
 use super::sheet::{Sheet, Vertex};
 use crate::tin::start::{full, network};
 use crate::{Grid, Raster, RasterError, Window};
@@ -17,6 +17,9 @@ pub struct Layout {
     /// What radii are enlarged by.
     slack: f64,
 }
+
+/// Samples along a side: products of two lengths are exact in f64.
+const MOST_SAMPLES: usize = 1 << 26;
 
 /// Why a block was not made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -39,10 +42,10 @@ pub enum BlockError {
 }
 
 impl Layout {
-    /// A grid of this size in squares of `cells` steps a side. `None` without a cell, or beyond 2^30 samples a side.
+    /// A grid of this size in squares of `cells` steps a side. `None` without a cell, or beyond 2^26 samples a side.
     #[must_use]
     pub fn new(columns: usize, rows: usize, cells: usize) -> Option<Self> {
-        let fits = |n: usize| (2..=1 << 30).contains(&n);
+        let fits = |n: usize| (2..=MOST_SAMPLES).contains(&n);
         (fits(columns) && fits(rows) && (2..=1 << 14).contains(&cells)).then_some(Layout {
             columns,
             rows,
@@ -148,10 +151,15 @@ pub fn leaf(raster: &dyn Raster, layout: &Layout, at: [usize; 2], floor: f64) ->
         .collect();
     let rules = layout.rules(0, at, 0).for_part(vertices.len());
     let started = vertices.clone();
-    let error = faces
-        .iter()
-        .map(|t| relief.error(t.map(|v| vertices[v as usize]), f64::INFINITY))
-        .fold(0.0, f64::max);
+    let error = if floor > 0.0 {
+        let mut gauge = Gauge::new(&relief);
+        let error = |t: &[u32; 3]| gauge.error(t.map(|v| vertices[v as usize]), f64::INFINITY);
+        faces.iter().map(error).fold(0.0, f64::max)
+    } else if faces.is_empty() {
+        0.0
+    } else {
+        relief.at_corners()
+    };
     let made = collapse(Sheet::new(vertices, faces, rules.scale), &relief, &rules)
         .ok_or(BlockError::NoNeighbours)?;
     // Insertion has kept the floor in integers; what was measured has an allowance for the arithmetic.

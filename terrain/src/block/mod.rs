@@ -21,6 +21,7 @@ mod history;
 mod join;
 mod leaf;
 mod relief;
+mod shapes;
 mod sheet;
 mod surface;
 

@@ -1,6 +1,7 @@
 //! Heights that triangles are measured against.
 
 use super::Vertex;
+use super::shapes::Shapes;
 use crate::tin::scan::{rows, rows_between_corners};
 use crate::{Raster, RasterError, Window};
 
@@ -86,55 +87,14 @@ impl Relief {
         self.cell > 1
     }
 
+    /// The error of triangles that have no sample but their corners.
+    pub(super) fn at_corners(&self) -> f64 {
+        self.rounding
+    }
+
     /// What is to be added to a greatest distance measured in f32 heights: what rounding them changed, and the arithmetic.
     fn allowance(&self) -> f64 {
         self.rounding + self.greatest * 1e-12
-    }
-
-    /// The greatest vertical distance of a triangle from the samples in it, or a bound of that; more than `enough` need not be exact. O(samples in it).
-    ///
-    /// Orientation does not matter; a triangle that is flat in the plan has none.
-    pub(super) fn error(&self, [a, b, c]: [Vertex; 3], enough: f64) -> f64 {
-        let (ux, uy) = (i64::from(b.x - a.x), i64::from(b.y - a.y));
-        let (vx, vy) = (i64::from(c.x - a.x), i64::from(c.y - a.y));
-        let area = ux * vy - uy * vx;
-        // A triangle of area 1 has no sample but its corners.
-        if area.abs() <= 1 && self.cell == 1 || area == 0 {
-            return if self.rounding > 0.0 && area != 0 { self.rounding } else { 0.0 };
-        }
-        if area.abs() == 2 && self.cell == 1 {
-            return self.halfway(a, b, c) + self.allowance();
-        }
-        let (uz, vz) = (f64::from(b.z) - f64::from(a.z), f64::from(c.z) - f64::from(a.z));
-        let part = 1.0 / area as f64;
-        let dx = (uz * vy as f64 - vz * uy as f64) * part;
-        let dy = (ux as f64 * vz - vx as f64 * uz) * part;
-        let (b, c) = if area < 0 { (c, b) } else { (b, c) };
-        let z = f64::from(a.z);
-        let most = if self.cell == 1 {
-            self.fine(a, b, c, z, dx, dy, enough)
-        } else {
-            self.coarse(a, b, c, z, dx, dy)
-        };
-        most + self.allowance()
-    }
-
-    /// The error of a triangle of one cell's area: it has one sample beside its corners, in the middle of a side (Pick's theorem). Two of five of all that are measured of a full grid are such.
-    #[inline]
-    fn halfway(&self, a: Vertex, b: Vertex, c: Vertex) -> f64 {
-        let even = |p: Vertex, q: Vertex| (p.x ^ q.x | p.y ^ q.y) & 1 == 0;
-        let (p, q) = if even(a, b) {
-            (a, b)
-        } else if even(b, c) {
-            (b, c)
-        } else {
-            (c, a)
-        };
-        let (x, y) = ((p.x + q.x) / 2 - self.column, (p.y + q.y) / 2 - self.row);
-        let height = self.low.get(y as usize * self.across + x as usize).copied().unwrap_or(f32::NAN);
-        let e = (0.5 * (f64::from(p.z) + f64::from(q.z)) - f64::from(height)).abs();
-        // A void sample compares as nothing.
-        if e > 0.0 { e } else { 0.0 }
     }
 
     /// The greatest height less the least in the box of these vertices: no triangle of them is farther from a sample in it. O(samples in the box).
@@ -156,8 +116,7 @@ impl Relief {
         (f64::from(high) - f64::from(low)).max(0.0) + self.allowance()
     }
 
-    #[allow(clippy::too_many_arguments)]
-    fn fine(&self, a: Vertex, b: Vertex, c: Vertex, z: f64, dx: f64, dy: f64, enough: f64) -> f64 {
+    fn fine(&self, [a, b, c]: [Vertex; 3], Plane { z, dx, dy }: Plane, enough: f64) -> f64 {
         let mut most = 0.0f64;
         // Corners are samples themselves.
         rows_between_corners((a.x, a.y), (b.x, b.y), (c.x, c.y), |y, x0, x1| {
@@ -182,7 +141,7 @@ impl Relief {
     }
 
     /// Over every cell that the triangle's rows touch, what the plane does over the part of it within the triangle's box.
-    fn coarse(&self, a: Vertex, b: Vertex, c: Vertex, z: f64, dx: f64, dy: f64) -> f64 {
+    fn coarse(&self, [a, b, c]: [Vertex; 3], Plane { z, dx, dy }: Plane) -> f64 {
         let mut most = 0.0f64;
         let (mut line, mut left, mut right) = (i32::MIN, 0, 0);
         let mut flush = |line: i32, x0: i32, x1: i32, y0: i32, y1: i32| {
@@ -217,6 +176,120 @@ impl Relief {
         }
         most
     }
+}
+
+/// Measures triangles against a relief.
+#[derive(Clone, Debug)]
+pub(super) struct Gauge<'a> {
+    relief: &'a Relief,
+    shapes: Shapes,
+    /// Large triangles measured of late.
+    seen: Vec<Seen>,
+    /// [`Relief::allowance`].
+    allowance: f64,
+}
+
+/// A triangle and its error, or less than that: whether it is all of it.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    corners: [i32; 6],
+    error: f64,
+    exact: bool,
+}
+
+/// Large triangles kept: a power of two. A vertex is looked at again whenever something around it changes, and most of its triangles are what they were.
+const SEEN: usize = 1 << 12;
+
+impl<'a> Gauge<'a> {
+    pub(super) fn new(relief: &'a Relief) -> Self {
+        let none = Seen { corners: [i32::MIN; 6], error: 0.0, exact: false };
+        Gauge {
+            relief,
+            shapes: Shapes::new(relief.across),
+            seen: vec![none; SEEN],
+            allowance: relief.allowance(),
+        }
+    }
+
+    /// The greatest vertical distance of a triangle from the samples in it, or a bound of that; more than `enough` need not be exact. O(samples in it).
+    ///
+    /// Orientation does not matter; a triangle that is flat in the plan has none.
+    #[inline]
+    pub(super) fn error(&mut self, [a, b, c]: [Vertex; 3], enough: f64) -> f64 {
+        let (u, v) = ([b.x - a.x, b.y - a.y], [c.x - a.x, c.y - a.y]);
+        let area = i64::from(u[0]) * i64::from(v[1]) - i64::from(u[1]) * i64::from(v[0]);
+        let fine = self.relief.cell == 1;
+        // A triangle of area 1 has no sample but its corners.
+        if area.abs() <= 1 && fine || area == 0 {
+            return if area == 0 { 0.0 } else { self.relief.rounding };
+        }
+        let (z, part) = (f64::from(a.z), 1.0 / area as f64);
+        let (uz, vz) = (f64::from(b.z) - z, f64::from(c.z) - z);
+        let plane = Plane {
+            z,
+            dx: (uz * f64::from(v[1]) - vz * f64::from(u[1])) * part,
+            dy: (f64::from(u[0]) * vz - f64::from(v[0]) * uz) * part,
+        };
+        if fine && let Some(inside) = self.shapes.of(u, v) {
+            let first = (a.y - self.relief.row) as isize * self.relief.across as isize
+                + (a.x - self.relief.column) as isize;
+            let mut most = 0.0f64;
+            for p in inside {
+                let height = self.relief.low.get((first + p.offset as isize) as usize);
+                let at = plane.z + plane.dx * f64::from(p.x) + plane.dy * f64::from(p.y);
+                let e = (at - f64::from(height.copied().unwrap_or(f32::NAN))).abs();
+                // Void samples compare as nothing.
+                most = if e > most { e } else { most };
+            }
+            return most + self.allowance;
+        }
+        self.large([a, b, c], area < 0, plane, enough)
+    }
+
+    fn large(&mut self, [a, b, c]: [Vertex; 3], turned: bool, plane: Plane, enough: f64) -> f64 {
+        let corners = [a.x, a.y, b.x, b.y, c.x, c.y];
+        // Fibonacci hashing.
+        let mix = corners.iter().fold(0u64, |h, &x| {
+            (h.rotate_left(11) ^ u64::from(x as u32)).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        });
+        let at = (mix >> 52) as usize % SEEN;
+        let seen = self.seen[at];
+        if seen.corners == corners && (seen.exact || seen.error > enough) {
+            return seen.error;
+        }
+        let (b, c) = if turned { (c, b) } else { (b, c) };
+        let most = if self.relief.cell == 1 {
+            self.relief.fine([a, b, c], plane, enough)
+        } else {
+            self.relief.coarse([a, b, c], plane)
+        };
+        let error = most + self.allowance;
+        self.seen[at] = Seen { corners, error, exact: most <= enough };
+        error
+    }
+
+    /// All samples are looked at, not cells of them.
+    pub(super) fn is_fine(&self) -> bool {
+        self.relief.cell == 1
+    }
+
+    /// What is added to every error that is not found to be 0.
+    pub(super) fn allowance(&self) -> f64 {
+        self.allowance
+    }
+
+    /// As [`Relief::span`].
+    pub(super) fn span(&self, vertices: impl Iterator<Item = Vertex>) -> f64 {
+        self.relief.span(vertices)
+    }
+}
+
+/// The plane of a triangle: its height at the first corner, and what it rises by from column to column and from row to row.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    z: f64,
+    dx: f64,
+    dy: f64,
 }
 
 /// Samples of a row looked at together.
@@ -281,11 +354,11 @@ mod tests {
             let want = brute(&grid, t);
             let all = Window::new(0, 0, 14, 11);
             let fine = Relief::read(&grid, all, 1000).unwrap();
-            prop_assert!((fine.error(t, f64::INFINITY) - want).abs() < 1e-9);
+            prop_assert!((Gauge::new(&fine).error(t, f64::INFINITY) - want).abs() < 1e-9);
             for most in [60, 20, 1] {
                 let coarse = Relief::read(&grid, all, most).unwrap();
                 prop_assert!(coarse.is_coarse());
-                prop_assert!(coarse.error(t, f64::INFINITY) >= want);
+                prop_assert!(Gauge::new(&coarse).error(t, f64::INFINITY) >= want);
             }
         }
     }
@@ -303,7 +376,7 @@ mod tests {
         ] {
             for k in 0..3 {
                 let t = [t[k], t[(k + 1) % 3], t[(k + 2) % 3]].map(v);
-                assert!((relief.error(t, f64::INFINITY) - brute(&grid, t)).abs() < 1e-9);
+                assert!((Gauge::new(&relief).error(t, f64::INFINITY) - brute(&grid, t)).abs() < 1e-9);
             }
         }
     }
@@ -315,6 +388,6 @@ mod tests {
         let relief = Relief::read(&grid, Window::new(0, 0, 3, 3), 9).unwrap();
         let v = |x: i32, y: i32| Vertex { x, y, z: grid.height(x as usize, y as usize).unwrap() as f32 };
         let t = [v(0, 0), v(2, 0), v(2, 2)];
-        assert!(relief.error(t, f64::INFINITY) >= brute(&grid, t));
+        assert!(Gauge::new(&relief).error(t, f64::INFINITY) >= brute(&grid, t));
     }
 }

@@ -24,9 +24,6 @@ pub(super) struct Round {
 }
 
 impl Round {
-    /// Nothing yet.
-    const NONE: Round = Round { reach: 0.0, upright: 1.0 };
-
     fn join(self, other: Round) -> Round {
         Round { reach: self.reach.max(other.reach), upright: self.upright.min(other.upright) }
     }
@@ -83,23 +80,28 @@ pub struct Sheet {
 impl Sheet {
     /// A sheet without a past: faces of the finest mesh.
     pub(super) fn new(vertices: Vec<Vertex>, faces: Vec<[u32; 3]>, scale: [f64; 2]) -> Self {
-        let mut round = vec![Round::NONE; vertices.len()];
+        // Squares of the reaches first.
+        let mut round = vec![(0.0f64, 1.0f32); vertices.len()];
         for f in &faces {
             let [a, b, c] = f.map(|v| vertices[v as usize]);
-            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(p, q)| square(p, q, scale));
-            let [u, v] = [b, c].map(|p| {
+            let from_a = |p: Vertex| {
                 let z = (f64::from(p.z) - f64::from(a.z)) * scale[1];
                 [f64::from(p.x - a.x), f64::from(p.y - a.y) * scale[0], z]
-            });
+            };
+            let (u, v) = (from_a(b), from_a(c));
+            let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+            let (ab, ca) = (dot(u, u), dot(v, v));
             let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-            let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
             // Rounded down, and well so.
-            let upright = (normal[2] / length) as f32 - 1e-6;
+            let upright = (normal[2] / dot(normal, normal).sqrt()) as f32 - 1e-6;
+            let bc = square(b, c, scale);
             for (v, far) in f.iter().zip([ab.max(ca), ab.max(bc), bc.max(ca)]) {
                 let own = &mut round[*v as usize];
-                *own = own.join(Round { reach: up(far.sqrt()), upright });
+                *own = (own.0.max(far), own.1.min(upright));
             }
         }
+        let round: Vec<Round> =
+            round.into_iter().map(|(far, upright)| Round { reach: up(far.sqrt()), upright }).collect();
         Sheet {
             round,
             joined: vec![[NONE; 3]; faces.len()],

@@ -34,6 +34,13 @@ pub(super) struct Ring {
     pub border: bool,
 }
 
+impl Ring {
+    /// How many of the faces go when the vertex goes to a neighbour (on a border, along that).
+    pub(super) fn dying(&self) -> usize {
+        if self.border { 1 } else { 2 }
+    }
+}
+
 /// A face that a collapse takes away.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Wing {

@@ -113,7 +113,7 @@ impl Codec<'_> {
             self.at += 1;
             // What comes soon is asked for now, so that it is at hand then.
             if let Some(&soon) = self.pass.get(self.at + AHEAD) {
-                self.ahead ^= self.walk.vertices[soon as usize].valence;
+                self.ahead ^= self.walk.vertices[soon as usize].valence as u32 ^ self.walk.ask(soon);
             }
             let vertex = &mut self.walk.vertices[v as usize];
             let visit = vertex.visit;

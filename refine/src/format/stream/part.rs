@@ -143,7 +143,7 @@ impl Path<'_> {
             to.code.push(without_arrangement(s.code[t]));
             to.error.push(s.error[t]);
             let place = places::point(&given.positions, t);
-            places::push(&mut self.mesh.new_positions, place);
+            places::push(self.mesh.new_positions.plain(), place);
             self.places.push(place);
             let now = |d: u32| match d.checked_sub(open.splits as u32) {
                 Some(b) if d != NONE => open.splits as u32 + order.slot[b as usize],
@@ -288,7 +288,7 @@ impl Path<'_> {
         }
         s.code.truncate(start);
         s.error.truncate(start);
-        match &mut self.mesh.new_positions {
+        match self.mesh.new_positions.plain() {
             Positions::F32(p) => p.truncate(start),
             Positions::F64(p) => p.truncate(start),
         }

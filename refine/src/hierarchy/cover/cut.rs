@@ -104,7 +104,8 @@ impl Walk<'_> {
                     (beyond, hi) = (on, t);
                 }
             }
-            (last, Corner { on: beyond, ..last })
+            let d = ring.triangles[beyond].distance(last.p);
+            (last, Corner { on: beyond, d, ..last })
         };
         let (first, last) = (end(of(0), of(n - 1)), end(of(len - 1), of(len)));
         let (mut own, mut rest) = (pile.fresh(), pile.fresh());
@@ -119,17 +120,22 @@ impl Walk<'_> {
     }
 }
 
-/// The face from which the farthest corner of a piece is least far, and how far that is; or the first that is found as good as any could be.
-pub(super) fn best(piece: &[Corner], triangles: &[Reach]) -> (f64, usize) {
+/// Of the faces that are nearest to corners of a piece, or of `all`, the one from which the farthest corner is least far, and how far that is; or the first that is found as good as any could be.
+pub(super) fn best(piece: &[Corner], triangles: &[Reach], all: bool) -> (f64, usize) {
     let least = piece.iter().map(|c| c.d).fold(0.0, f64::max);
     let mut out = (f64::INFINITY, 0);
     let mut attempt = |on: usize| {
         let mut most = 0.0f64;
         for c in piece {
-            if triangles[on].is_beyond(c.p, out.0) {
+            // That is known.
+            let d = if c.on == on {
+                c.d
+            } else if triangles[on].is_beyond(c.p, out.0) {
                 return false;
-            }
-            most = most.max(triangles[on].distance(c.p));
+            } else {
+                triangles[on].distance(c.p)
+            };
+            most = most.max(d);
             if most >= out.0 {
                 return false;
             }
@@ -139,7 +145,7 @@ pub(super) fn best(piece: &[Corner], triangles: &[Reach]) -> (f64, usize) {
     };
     // Those that are nearest to a corner first: they rule most others out.
     let near = |k: usize| piece[..k].iter().all(|c| c.on != piece[k].on);
-    if !(0..piece.len()).any(|k| near(k) && attempt(piece[k].on)) {
+    if !(0..piece.len()).any(|k| near(k) && attempt(piece[k].on)) && all {
         (0..triangles.len()).any(attempt);
     }
     out

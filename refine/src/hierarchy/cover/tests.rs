@@ -1,7 +1,7 @@
 use super::shapes::{area, convex_hull, join};
 use super::*;
 use crate::aif::{BuildOptions, Mesh, MeshInput, Positions};
-use crate::hierarchy::{Rule, by_errors, estimate, finest};
+use crate::hierarchy::{Rule, estimate, finest, order};
 use crate::progressive::build;
 use crate::simplify::{Options as Simplify, Quiet};
 use progmesh_meshes::{GenerateOptions, generate};
@@ -36,7 +36,8 @@ fn holds(polygon: &[[f64; 2]], p: [f64; 2]) -> bool {
         (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
     };
     let turns = || (0..polygon.len()).map(turn);
-    turns().all(|t| t > -1e-9) || turns().all(|t| t < 1e-9)
+    // One that is no larger than rounding lies on all sides of everything.
+    area(polygon) > 1e-8 && (turns().all(|t| t > -1e-9) || turns().all(|t| t < 1e-9))
 }
 
 /// A polygon and the triangle that it is put on.
@@ -55,8 +56,10 @@ fn every_place_lies_in_a_piece_that_is_as_near_to_its_face_as_was_said() {
         let mesh = Mesh::build(input, &BuildOptions::default()).unwrap().0;
         let mut pm = build(mesh, &Simplify::default(), &Quiet).unwrap().mesh;
         let (forest, front, _) = finest(&pm, Rule::Rings).unwrap();
-        let (errors, diagonal) = estimate::errors(&pm, &forest, front);
-        pm = pm.reordered(&by_errors(&pm, errors, diagonal)).unwrap();
+        let full = Finest::new(&pm, &forest, &front);
+        let diagonal = full.diagonal;
+        let errors = estimate::errors(&pm, &forest, front.clone(), &full);
+        pm = pm.reordered(&order::by_errors(&pm, &forest, front, full, &errors)).unwrap();
         let (forest, front, turns) = finest(&pm, Rule::Rings).unwrap();
         assert!(turns.is_some());
         let whole = Finest::new(&pm, &forest, &front);

@@ -8,7 +8,7 @@
 //! s <= away and a = away + s: as long as the sum M + a T has grown by less than s, the eye has moved by less than s, so it is nearer to p than a, and no function has changed by s. A change of the tolerance adds to M what it adds to the
 //! distance of a clock. Sums are kept in f64, times in f32 with a margin for its rounding, and all begins anew when the sums become large.
 
-use super::{AHEAD, About, Clock, Judges, Pace, SAFE, STEPS};
+use super::{AHEAD, About, Clock, Found, Judges, Many, Pace, SAFE, STEPS};
 use crate::selective::Lens;
 use crate::selective::entry::Entry;
 
@@ -21,6 +21,10 @@ pub(crate) struct Clocks {
     turned: f64,
     /// There is one lens, in perspective.
     apart: bool,
+    /// What the last frame has added to both.
+    step: [f64; 2],
+    /// The lens some frames on, if it goes on so.
+    coming: Option<Lens>,
 }
 
 /// When to look at something again.
@@ -33,6 +37,8 @@ pub(crate) struct Due {
 
 /// Of sums of f32: a few roundings, of 6e-8 each.
 const ROUNDED: f64 = 1e-6;
+/// Frames that what will be needed is looked at ahead.
+const AHEAD_OF: f64 = 8.0;
 /// The largest sums: radians, and diagonals.
 const MOST: f64 = 4.0;
 
@@ -44,17 +50,29 @@ impl Due {
 impl Clocks {
     /// Before the first lens.
     pub(crate) fn new(diagonal: f64) -> Clocks {
-        Clocks { all: Clock::new(diagonal), moved: 0.0, turned: 0.0, apart: false }
+        Clocks {
+            all: Clock::new(diagonal),
+            moved: 0.0,
+            turned: 0.0,
+            apart: false,
+            step: [0.0; 2],
+            coming: None,
+        }
     }
 
     /// As [`Clock::go_on`].
     pub(crate) fn go_on(&mut self, judges: &Judges<'_>) -> bool {
         let apart = matches!(judges.lenses, [l] if l.perspective);
         let motion = self.motion(judges, apart);
+        self.coming = match (&self.all.lenses[..], judges.lenses) {
+            ([before], [lens]) if motion.is_some() => Some(lens.going_on(before, AHEAD_OF)),
+            _ => None,
+        };
         let stands = self.all.go_on(judges);
         if let Some([moved, turned]) = motion.filter(|_| stands && self.apart == apart) {
             self.moved += moved;
             self.turned += turned;
+            self.step = [moved, turned];
             if self.moved < MOST * self.all.pace.diagonal && self.turned < MOST {
                 return true;
             }
@@ -94,50 +112,83 @@ impl Clocks {
         Sums { moved: self.moved as f32, turned: self.turned as f32 }
     }
 
-    /// Whether a split is needed, and when that is to be looked at again.
-    #[inline]
-    pub(crate) fn of_next(&self, judges: &Judges<'_>, e: &Entry) -> (bool, Due) {
-        self.of(judges, e, 1.0)
+    /// How slack is measured.
+    fn pace(&self) -> Pace {
+        let pace = self.all.pace;
+        if self.apart { Pace { about: About::Each, eye: 1.0, ..pace } } else { pace }
     }
 
-    /// Whether a split is to be kept, and when that is to be looked at again.
-    #[inline]
-    pub(crate) fn of_last(&self, judges: &Judges<'_>, e: &Entry) -> (bool, Due) {
-        self.of(judges, e, judges.keep)
+    /// To ask about many, whether they are needed.
+    pub(crate) fn next<'a>(&self, judges: &Judges<'a>) -> Many<'a> {
+        judges.many(1.0, &self.pace())
     }
 
+    /// To ask about many, whether they are to be kept.
+    pub(crate) fn last<'a>(&self, judges: &Judges<'a>) -> Many<'a> {
+        judges.many(judges.keep, &self.pace())
+    }
+
+    /// Whether each is needed, or to be kept, and when that is to be looked at again.
+    pub(crate) fn look(&self, many: &Many<'_>, entries: &[Entry], out: &mut Looked) {
+        out.found.clear();
+        many.look(entries, &mut out.found);
+        out.due.clear();
+        let due = |(e, f): (&Entry, &Found)| self.due(&many.judges, e, f64::from(f.slack));
+        out.due.extend(entries.iter().zip(&out.found).map(due));
+    }
+
+    /// [`AHEAD_OF`] frames like the last before a time, and whether that has come; then a part of them from now.
+    pub(crate) fn ahead_of(&self, due: Due) -> (Due, bool) {
+        let away = f64::from(due.away);
+        let by = AHEAD_OF * (self.step[0] + away * self.step[1]);
+        let now = self.moved + away * self.turned;
+        let until = f64::from(due.until);
+        let soon = until - by <= now;
+        let early = if soon { until.min(now + 0.25 * by) } else { until - by };
+        (Due { until: early as f32, ..due }, soon)
+    }
+
+    /// A split would be needed [`AHEAD_OF`] frames on, if the lens went on so.
+    pub(crate) fn will_want(&self, judges: &Judges<'_>, e: &Entry) -> bool {
+        self.coming.as_ref().is_some_and(|l| l.wants(e, l.tau) && judges.lenses.len() == 1)
+    }
+
+    /// When something that has this slack is to be looked at again.
     #[inline]
-    fn of(&self, judges: &Judges<'_>, e: &Entry, part: f64) -> (bool, Due) {
+    fn due(&self, judges: &Judges<'_>, e: &Entry, slack: f64) -> Due {
         // As far as changes of the tolerance are looked after.
         let most = AHEAD as f64 / STEPS * self.all.pace.diagonal;
-        let (v, away, slack) = match judges.lenses {
+        let (away, slack) = match judges.lenses {
             [lens] if self.apart => {
                 let away = (e.centre.as_dvec3() - lens.eye).length();
-                // Places as they come, however far: they say themselves.
-                let pace = Pace {
-                    about: About::Eye,
-                    diagonal: f64::INFINITY,
-                    per_tau: self.all.pace.per_tau,
-                    eye: 1.0,
-                };
-                let v = lens.verdict(e, part * lens.tau, &pace);
-                let slack = v.slack.min(away).min(most);
-                (v, away + slack, slack)
+                let slack = slack.min(away).min(most);
+                (away + slack, slack)
             }
-            _ => {
-                let v = judges.of(e, part, &self.all.pace);
-                (v, 0.0, v.slack.min(most))
-            }
+            _ => (0.0, slack.min(most)),
         };
         let until = self.moved + away * self.turned + slack * SAFE;
         let until = (until - ROUNDED * until) as f32;
         // NaN is now.
-        (v.wanted, if until.is_nan() { Due::NOW } else { Due { away: away as f32, until } })
+        if until.is_nan() { Due::NOW } else { Due { away: away as f32, until } }
+    }
+}
+
+/// What was found out about many.
+#[derive(Debug, Default)]
+pub(crate) struct Looked {
+    found: Vec<Found>,
+    due: Vec<Due>,
+}
+
+impl Looked {
+    /// Whether each is needed, or to be kept, and when to look again.
+    pub(crate) fn each(&self) -> impl Iterator<Item = (bool, Due)> + '_ {
+        self.found.iter().zip(&self.due).map(|(f, &due)| (f.wanted, due))
     }
 }
 
 /// The sums at a frame.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Sums {
     moved: f32,
     turned: f32,
@@ -231,20 +282,26 @@ mod tests {
                 let (stands, one_stands) = (clocks.go_on(&judges), one.go_on(&judges));
                 assert_eq!(stands, one_stands);
                 let begun = frame > 0;
+                let (mut due, mut looked) = (Vec::new(), Looked::default());
                 for (i, e) in entries.iter().enumerate() {
                     if begun && stands && !clocks.sums().have_reached(dues[i].1) {
                         assert_eq!(dues[i].0, judges.keep(e), "round {round}, frame {frame}, {e:?}");
                         stood += 1;
                     } else {
-                        let found = clocks.of_last(&judges, e);
-                        assert_eq!(found.0, judges.keep(e));
-                        if begun {
-                            dues[i] = found
-                        } else {
-                            dues.push(found)
-                        }
-                        looks += 1;
+                        due.push(i);
                     }
+                }
+                // All that are due together, decided as the lens does.
+                let asked: Vec<Entry> = due.iter().map(|&i| entries[i]).collect();
+                clocks.look(&clocks.last(&judges), &asked, &mut looked);
+                dues.resize(entries.len(), (false, Due::NOW));
+                assert_eq!(looked.each().count(), due.len());
+                for (&i, found) in due.iter().zip(looked.each()) {
+                    assert_eq!(found.0, judges.keep(&entries[i]));
+                    dues[i] = found;
+                }
+                looks += due.len();
+                for (i, e) in entries.iter().enumerate() {
                     if !begun || !stands || Clock::has_come(one.now(), by_one[i]) {
                         let due = one.due(judges.of_last(e, &one).slack, e.split);
                         if begun {

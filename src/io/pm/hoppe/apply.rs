@@ -103,7 +103,7 @@ impl Builder {
         b.streams = WedgeStreams {
             stride,
             base_vertex: b.wedge_vertex.clone(),
-            rows: b.rows.clone(),
+            rows: b.rows.clone().into(),
             present: Presence::all(b.all(), wedges),
             ..Default::default()
         };
@@ -564,14 +564,14 @@ impl Builder {
             None => length(r.large).max(length(r.small)),
         };
         splits.error.push(if error.is_finite() { error } else { 0.0 });
-        push(&mut self.out.new_positions, self.positions[vt]);
+        push(self.out.new_positions.plain(), self.positions[vt]);
         if s.moved {
-            push(&mut self.out.moved_positions, self.positions[ring.vs as usize]);
+            push(self.out.moved_positions.plain(), self.positions[ring.vs as usize]);
         }
         let listed: Vec<u32> = (fresh..fresh + new).chain(s.changed.iter().copied()).collect();
         for w in listed {
             let at = w as usize * self.stride;
-            self.streams.rows.extend_from_slice(&self.rows[at..at + self.stride]);
+            self.streams.rows.plain().extend_from_slice(&self.rows[at..at + self.stride]);
             self.streams.present.push(1);
         }
         if !plain {
