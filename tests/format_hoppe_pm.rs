@@ -571,6 +571,12 @@ fn the_corpus_is_written_anew() {
     std::fs::write(folder.join("small.pm"), bytes).unwrap();
 }
 
+#[test]
+fn files_that_were_read_wrongly_once() {
+    check(8174623075895850993, 15, true, true, false);
+    check(3894009739266338985, 17, true, false, false);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 

@@ -46,7 +46,7 @@ fn scene(geometry: MeshInput) -> Scene {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig::with_cases(400))]
 
     #[test]
     fn what_is_written_reads_back(input in mesh(Kinds { per_corner: true, custom: &[] })) {

@@ -51,7 +51,7 @@ const EVERY_ENCODING: &[Encoding] = &[
 ];
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig::with_cases(300))]
 
     #[test]
     fn what_is_written_reads_back(input in mesh(Kinds { per_corner: false, custom: EVERY_ENCODING }), as_text: bool) {

@@ -207,7 +207,6 @@ fn truncated_anywhere_is_an_error() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
     #[test]
     fn round_trips_and_agrees_with_stl_io(
         points in prop::collection::vec(prop::array::uniform3(-1e3f32..1e3), 3..20),

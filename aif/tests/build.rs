@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Soup, config, either, faces_of};
+use common::{Soup, either, faces_of};
 use progmesh_aif::{BuildError, BuildOptions, Mesh, MeshInput, VertexId, Weld};
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -66,7 +66,7 @@ fn assert_is_model(soup: &Soup, mesh: &Mesh) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(config(512))]
+    #![proptest_config(ProptestConfig::with_cases(512))]
 
     #[test]
     fn any_soup_builds_a_mesh_that_is_its_model(soup in either()) {

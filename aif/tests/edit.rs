@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{config, either, faces_of};
+use common::{either, faces_of};
 use glam::DVec3;
 use progmesh_aif::{BuildOptions, EdgeId, Marks, Mesh, MeshInput};
 use proptest::prelude::*;
@@ -30,7 +30,7 @@ fn with_wedges(mut input: MeshInput) -> MeshInput {
 }
 
 proptest! {
-    #![proptest_config(config(512))]
+    #![proptest_config(ProptestConfig::with_cases(512))]
 
     #[test]
     fn collapses_keep_a_mesh_and_splits_restore_it(

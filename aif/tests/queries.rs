@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{config, either, faces_of};
+use common::{either, faces_of};
 use progmesh_aif::{BuildOptions, EdgeKind, FaceId, Mesh, NONE, VertexId, VertexKind};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -27,7 +27,7 @@ fn groups(items: Vec<usize>, shares: impl Fn(usize, usize) -> bool) -> Vec<Vec<u
 }
 
 proptest! {
-    #![proptest_config(config(384))]
+    #![proptest_config(ProptestConfig::with_cases(384))]
 
     #[test]
     fn fans_cover_the_faces_of_a_vertex(soup in either()) {

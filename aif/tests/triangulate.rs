@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{config, either};
+use common::either;
 use glam::DVec3;
 use progmesh_aif::{BuildOptions, Mesh, triangulate_polygon};
 use proptest::prelude::*;
@@ -65,7 +65,7 @@ fn histogram() -> impl Strategy<Value = Vec<DVec3>> {
 }
 
 proptest! {
-    #![proptest_config(config(512))]
+    #![proptest_config(ProptestConfig::with_cases(512))]
 
     #[test]
     fn star_shaped_polygons_are_tiled(p in star_shaped()) {

@@ -96,7 +96,7 @@ fn a_file_returns_the_input_bit_for_bit_whatever_made_it() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 8, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(8))]
 
     #[test]
     fn random_meshes_return(name in 0..NAMES.len(), faces in 100..1500usize, seed in 0..1000u64, run in 0..5usize) {

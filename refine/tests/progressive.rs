@@ -202,7 +202,7 @@ fn errors_nest_and_seeking_by_error_finds_the_coarsest_state() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
     fn wherever_a_cursor_wanders_it_finds_what_a_fresh_one_finds(
@@ -252,7 +252,7 @@ fn new_places_lie_on_the_grid_that_was_asked_for() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(24))]
 
     /// The l/r rule: whatever order respects the dependencies refines to the same mesh.
     #[test]

@@ -111,7 +111,7 @@ fn check_places(a: &Soup, b: &Soup, bound: f64, tolerance: f64) -> Result<(), Te
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 30, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(30))]
 
     #[test]
     fn intervals_hold_for_soups(a in soup(10), b in soup(10), digits in 2i32..7) {
@@ -162,7 +162,7 @@ fn joined(a: &Soup, b: &Soup) -> Soup {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(40))]
 
     /// Sheets that cover each other, or do not quite: with holes, folded back, close to another sheet, torn into soups, turned over.
     #[test]

@@ -16,7 +16,7 @@ fn brute(p: DVec3, (points, triangles): &Soup) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
     fn the_closest_point_is_as_near_as_any(s in soup(60), asked in prop::collection::vec(prop::array::uniform3(-2.0..2.0f64), 20), far in -9..9i32) {

@@ -52,7 +52,7 @@ fn meet(s: &[DVec3; 3], t: &[DVec3; 3]) -> bool {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(100))]
 
     #[test]
     fn pairs_are_those_of_convex_sets(

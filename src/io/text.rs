@@ -632,18 +632,35 @@ mod tests {
         assert!(show(&[b'x'; 5000]).len() < 60);
     }
 
+    fn reads_back(bits: u32) -> Result<(), TestCaseError> {
+        let mut out = Vec::new();
+        write_f32(&mut out, f32::from_bits(bits));
+        let n = Number::parse(&out).unwrap();
+        prop_assert_eq!((n.value as f32).to_bits(), bits);
+        prop_assert!(n.fits_f32(), "{}", String::from_utf8_lossy(&out));
+        Ok(())
+    }
+
+    fn nine_digits_fit(bits: u32) -> Result<(), TestCaseError> {
+        let digits = format!("{:.8e}", f32::from_bits(bits));
+        prop_assert!(Number::parse(digits.as_bytes()).unwrap().fits_f32());
+        Ok(())
+    }
+
+    #[test]
+    fn a_single_of_ten_digits_is_told() {
+        // 351751.6875
+        reads_back(1219215606).unwrap();
+        nine_digits_fit(1219215606).unwrap();
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
 
         #[test]
         fn f32_reads_back_bit_for_bit(bits: u32) {
-            let x = f32::from_bits(bits);
-            prop_assume!(x.is_finite());
-            let mut out = Vec::new();
-            write_f32(&mut out, x);
-            let n = Number::parse(&out).unwrap();
-            prop_assert_eq!((n.value as f32).to_bits(), bits);
-            prop_assert!(n.fits_f32(), "{}", String::from_utf8_lossy(&out));
+            prop_assume!(f32::from_bits(bits).is_finite());
+            reads_back(bits)?;
         }
 
         #[test]
@@ -679,10 +696,8 @@ mod tests {
 
         #[test]
         fn nine_digits_of_an_f32_pass_for_single(bits: u32) {
-            let x = f32::from_bits(bits);
-            prop_assume!(x.is_normal());
-            let digits = format!("{x:.8e}");
-            prop_assert!(Number::parse(digits.as_bytes()).unwrap().fits_f32());
+            prop_assume!(f32::from_bits(bits).is_normal());
+            nine_digits_fit(bits)?;
         }
     }
 }

@@ -59,11 +59,6 @@ pub fn patch() -> impl Strategy<Value = Soup> {
     })
 }
 
-/// No files beside the sources: a failure prints its least case, which then becomes a test of its own.
-pub fn config(cases: u32) -> ProptestConfig {
-    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
-}
-
 pub fn either() -> impl Strategy<Value = Soup> {
     prop_oneof![soup(), patch()]
 }

@@ -110,7 +110,7 @@ impl Polygon {
             }
         }
         if found.is_empty() {
-            if self.has_line_inside(line) {
+            if self.has_line_inside(line, &sides) {
                 out.push(&whole_line(line));
             }
             return out;
@@ -119,17 +119,25 @@ impl Polygon {
         out
     }
 
-    /// True if a line that no edge crosses lies inside.
-    fn has_line_inside(&self, line: DVec3) -> bool {
-        let [u, _, v] = frame(line);
-        // A place on the line and one just left of an edge are on the same side of the boundary if an even number of edges is between
-        // them. Another place is tried where a vertex lies in the way.
+    /// True if what lies just on the positive side of a line that cuts no cycle is inside.
+    ///
+    /// The cycles on that side decide it alone; to them all of the other side is one place. If there are none, the others do, to which all of the
+    /// positive side is one place. Of that a point far from the line is looked at: one on it would be rounded to one of its sides, and edges may lie
+    /// along it.
+    fn has_line_inside(&self, line: DVec3, sides: &[f64]) -> bool {
+        let cycles = || (0..self.ends.len()).map(|k| self.range(k));
+        let positive = |&(from, _): &(u32, u32)| sides[from as usize] > 0.0;
+        let side = cycles().any(|c| positive(&c));
+        let deciding = || cycles().filter(|c| positive(c) == side);
+        let [u, n, v] = frame(line);
+        let far = if side { -n } else { n };
+        // Another point is tried where a vertex lies in the way.
         for k in 0..32 {
             let (sin, cos) = (k as f64 * 2.399_963 + 0.1).sin_cos();
-            let p = u * cos + v * sin;
-            for (from, to) in (0..self.ends.len()).map(|k| self.range(k)).take(2) {
+            let p = far + u * cos + v * sin;
+            for (from, to) in deciding().take(2) {
                 let edge = from + k % (to - from);
-                if let Some(inside) = self.is_inside(p, edge, next(edge, from, to)) {
+                if let Some(inside) = self.is_inside(p, edge, next(edge, from, to), deciding()) {
                     return inside;
                 }
             }
@@ -137,13 +145,21 @@ impl Polygon {
         false
     }
 
-    /// True if `p` is inside, by the way from it to the middle of an edge; `None` if that way meets a vertex.
-    fn is_inside(&self, p: DVec3, a: u32, b: u32) -> Option<bool> {
+    /// True if `p` is inside of `cycles`, by the way from it to the middle of an edge of theirs; `None` if that way meets a vertex.
+    ///
+    /// A point and one just left of an edge are on the same side of the boundary if an even number of edges is between them.
+    fn is_inside(
+        &self,
+        p: DVec3,
+        a: u32,
+        b: u32,
+        cycles: impl Iterator<Item = (u32, u32)>,
+    ) -> Option<bool> {
         let at = |i: u32| self.points[i as usize];
         let m = at(a).try_normalize()? + at(b).try_normalize()?;
         let left = det3(at(a), at(b), p);
         let mut inside = if left == 0.0 { return None } else { left > 0.0 };
-        for (from, to) in (0..self.ends.len()).map(|k| self.range(k)) {
+        for (from, to) in cycles {
             for c in (from..to).filter(|&c| c != a) {
                 let d = next(c, from, to);
                 let ends = [det3(p, m, at(c)), det3(p, m, at(d))];
