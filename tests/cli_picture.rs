@@ -122,7 +122,7 @@ fn drawing_is_in_the_times() {
     assert!(of("draw") > 0.0);
     let parts = ["read", "build", "simplify", "write", "draw"].map(of).iter().sum::<f64>();
     assert!(parts <= of("total") + 1e-3, "{seconds}");
-    assert!(run.stderr.contains(", draw 0."), "{}", run.stderr);
+    assert!(run.stderr.contains(", draw "), "{}", run.stderr);
     let run = p.done("simplify in.obj out.obj --ratio 0.5 --json");
     assert!(!run.stderr.contains("draw") && run.json()["seconds"]["draw"] == 0.0);
 }

@@ -304,22 +304,29 @@ fn an_interrupt_ends_with_130_and_writes_nothing() {
     use std::process::{Command, Stdio};
     let p = Place::new();
     // It waits for standard input, which never comes.
-    let mut child = Command::new(env!("CARGO_BIN_EXE_progmesh"))
-        .current_dir(p.directory())
-        .args("simplify - out.obj --from obj --ratio 0.5".split(' '))
-        .stdin(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    // Until the handler is there, the signal ends the process as it would any; so try until it has been seen.
-    std::thread::sleep(std::time::Duration::from_millis(300));
-    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    let out = {
+    let interrupted_after = |wait: u64| {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_progmesh"))
+            .current_dir(p.directory())
+            .args("simplify - out.obj --from obj --ratio 0.5".split(' '))
+            .stdin(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(wait));
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
         let stdin = child.stdin.take();
         let out = child.wait_with_output().unwrap();
         drop(stdin);
         out
     };
+    // Until the handler is there, the signal ends the process as it would any, which has no exit code then: on a busy machine that takes a while.
+    let mut out = interrupted_after(25);
+    for wait in (1..12).map(|k| 25 << k) {
+        if out.status.code().is_some() {
+            break;
+        }
+        out = interrupted_after(wait);
+    }
     assert_eq!(out.status.code(), Some(130), "{:?}", out.status);
     assert!(String::from_utf8_lossy(&out.stderr).contains("interrupted; nothing was written"));
     assert!(p.files().is_empty());

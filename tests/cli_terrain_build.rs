@@ -88,32 +88,27 @@ fn finished_blocks_are_not_made_again() {
     assert_eq!(p.read("hills.pm"), whole);
 }
 
+#[cfg(unix)]
 #[test]
 fn a_run_that_was_killed_goes_on() {
+    use std::os::unix::process::ExitStatusExt;
     let p = Place::new();
     let heights = |i: u32| ((i % 300) * (i / 300) % 251 + i * 7919 % 13) as u8;
     p.write("rough.raw", (0..90_000).map(heights).collect::<Vec<_>>());
     let arguments = "terrain build rough.raw rough.pm --size 300x300 --type u8 --block 32 --json";
-    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_progmesh"))
-        .args(arguments.split(' '))
+    // The system kills it in the middle of the first file of more than 88 kB. The finest hundred blocks are smaller, what is made of them is larger:
+    // that takes no watching, so no busy machine is too slow for it.
+    let limited = format!("ulimit -c 0; ulimit -f 176; exec \"$0\" {arguments}");
+    let killed = std::process::Command::new("sh")
+        .args(["-c", &limited, env!("CARGO_BIN_EXE_progmesh")])
         .current_dir(p.directory())
-        .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::null())
-        .spawn()
+        .output()
         .unwrap();
-    // Of a hundred blocks and what follows some are enough.
-    let done = || {
-        let files = std::fs::read_dir(p.path("rough.pm.work")).into_iter().flatten().flatten();
-        files.filter(|f| f.file_name().to_string_lossy().ends_with(".block")).count()
-    };
-    while done() < 3 && child.try_wait().unwrap().is_none() {
-        std::thread::sleep(std::time::Duration::from_millis(2));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
-    assert!(!p.exists("rough.pm"));
+    assert!(killed.status.signal().is_some(), "{killed:?}");
+    assert!(!p.exists("rough.pm") && p.exists("rough.pm.work"));
     let again = p.done(arguments).json();
-    assert!(again["blocks_found"].as_u64().unwrap() >= 3);
+    let found = again["blocks_found"].as_u64().unwrap();
+    assert!((100..again["blocks"].as_u64().unwrap()).contains(&found), "{found}");
     assert!(!p.exists("rough.pm.work"));
     let resumed = p.read("rough.pm");
     assert_eq!(p.done(arguments).json()["blocks_found"].as_u64(), Some(0));

@@ -76,8 +76,13 @@ fn cells_keep_their_area(seed: u64) -> Result<(), TestCaseError> {
         for i in (0..36).filter(|&i| cells[i]) {
             let at = DVec3::new((i % 6) as f64, (i / 6) as f64, 0.0);
             let (a, b, c, d) = (at, at + DVec3::X, at + DVec3::new(1.0, 1.0, 0.0), at + DVec3::Y);
+            let sides = [a, b, c, d].map(|p| line.dot(p + DVec3::Z));
             let plane = [DVec4::new(line.x, line.y, 0.0, line.z)];
-            sum += enumerated(&[a, b, c], &plane) + enumerated(&[a, c, d], &plane);
+            sum += match (sides.iter().all(|&s| s >= 0.0), sides.iter().all(|&s| s <= 0.0)) {
+                (_, true) => 0.0,
+                (true, _) => 1.0,
+                _ => enumerated(&[a, b, c], &plane) + enumerated(&[a, c, d], &plane),
+            };
         }
         sum
     };
@@ -86,18 +91,16 @@ fn cells_keep_their_area(seed: u64) -> Result<(), TestCaseError> {
         let (got, want) = (polygon_area(&clipped), want(line));
         prop_assert!((got - want).abs() < 1e-8, "{got} {want} {line}");
         for p in clipped.cycles().flatten() {
-            prop_assert!(line.dot(*p) / p.z >= -1e-9 * line.length());
+            prop_assert!(p.z > 0.0 && line.dot(*p) / p.z >= -1e-9 * line.length(), "{p}");
         }
         // Again: nothing changes. (What lies on the line is on it but for rounding.)
         let again = polygon_area(&clipped.clip(line + DVec3::Z * 1e-9 * line.truncate().length()));
-        if (again-got).abs() >= 1e-6 { eprintln!("line {line} in {polygon:?}\nclipped {clipped:?}\nagain {:?}", clipped.clip(line + DVec3::Z * 1e-9 * line.truncate().length())); }
         prop_assert!((again - got).abs() < 1e-6, "{again} {got}");
     }
     // Seen through any projective map, also one that takes part of it past infinity, it is the same polygon.
     let m = DMat3::from_cols(vector(&mut r, 1.0), vector(&mut r, 1.0), vector(&mut r, 1.0));
-    prop_assume!(m.determinant() > 0.05);
-    let seen = Polygon::new(polygon.cycles().map(|c| c.iter().map(|&p| m * p).collect::<Vec<_>>()));
-    if seed % 4 == 0 {
+    if seed % 4 == 0 && m.determinant() > 0.05 {
+        let seen = Polygon::new(polygon.cycles().map(|c| c.iter().map(|&p| m * p).collect::<Vec<_>>()));
         let back = m.inverse();
         let clipped = seen.clip(back.transpose() * line);
         let home = Polygon::new(clipped.cycles().map(|c| c.iter().map(|&p| back * p).collect::<Vec<_>>()));

@@ -311,9 +311,15 @@ fn pages_made_ahead_change_nothing() {
     let tight = needed(&bytes) + (300 << 10);
     for (bytes, limit) in [(&bytes, 64 << 20), (&bytes, tight), (&damaged, 64 << 20)] {
         let (alone, none) = fly(bytes, limit, 1);
-        let (shared, ahead) = fly(bytes, limit, 3);
-        assert!(alone == shared && none == 0);
-        assert_eq!(ahead > 0, cfg!(feature = "parallel") && limit != tight);
+        assert_eq!(none, 0);
+        // Whether the others come to do anything while this thread waits is up to the machine; once they do.
+        let makes_ahead = cfg!(feature = "parallel") && limit != tight;
+        let mut flights = (0..if makes_ahead { 50 } else { 1 }).map(|_| fly(bytes, limit, 3));
+        let ahead = flights.by_ref().find_map(|(shared, ahead)| {
+            assert!(alone == shared);
+            (ahead > 0).then_some(ahead)
+        });
+        assert_eq!(ahead.is_some(), makes_ahead);
         let whole = alone.iter().all(|f| f.0.as_ref().is_ok_and(|d| d.done.complete));
         assert_eq!(whole, limit != tight && bytes != &damaged);
     }

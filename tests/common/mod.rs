@@ -100,9 +100,9 @@ impl Place {
     }
 }
 
-/// No run of these tests may take longer: what does, hangs.
+/// No run of these tests takes nearly as long, however busy the machine: what does, hangs.
 fn limit() -> std::time::Duration {
-    std::time::Duration::from_secs(60)
+    std::time::Duration::from_secs(600)
 }
 
 impl Run {
