@@ -44,7 +44,7 @@ pub(crate) struct Args {
     /// Measure and write what view-dependent refinement decides by, so that extract and fly begin at once: 5 to 7 bytes a vertex
     #[arg(long, help_heading = "File")]
     bounds: bool,
-    /// Measure and write what extract and fly need for --memory: wider bounds than those of --bounds, and links between the chunks
+    /// Measure and write what extract and fly need for --memory: what --bounds writes, and links between the chunks: 9 to 11 bytes a vertex
     #[arg(long, help_heading = "File", conflicts_with_all = ["sequential", "bounds"])]
     paged: bool,
     #[command(flatten)]
@@ -87,14 +87,9 @@ impl Args {
             let mut built = built;
             let measuring = Instant::now();
             if self.bounds || self.paged {
-                // Out of core, rings are not all at hand.
-                let options = match self.paged {
-                    true => hierarchy::Options::CUTS,
-                    false => hierarchy::Options::RINGS,
-                };
                 built
                     .scene
-                    .measure_bounds(&options)
+                    .measure_bounds(&hierarchy::Options::RINGS)
                     .map_err(|(m, e)| Failure::Input(format!("{file}: mesh {m}: {e}")))?;
                 if interrupt.is_set() {
                     return Err(Failure::Interrupted);
