@@ -92,6 +92,7 @@ fn wrong_cameras_and_paths_are_named() {
         ("extract in.ply out.ply --camera cam.json --rule rings --no-guard", 2, "--rule truly"),
         ("extract in.ply out.ply --camera cam.json --no-guard", 2, "--rule"),
         ("fly in.ply --path circle --rule cuts --error directional", 2, "--rule rings"),
+        ("encode in.ply out.pm --directional", 2, "--bounds or --paged"),
     ] {
         let run = p.run(arguments);
         assert_eq!(run.code, code, "{arguments}: {}", run.stderr);
@@ -252,6 +253,23 @@ fn with_a_limit_of_memory_the_same_is_shown_of_fewer_bytes() {
     assert!(slow["frames"].as_array().unwrap().iter().all(|f| number(f, "fetched") <= 1));
     assert!(number(&all["frames"][0], "fetched") > 1);
     assert!(number(&slow["frames"][0], "faces") < number(&all["frames"][0], "faces"));
+}
+
+/// A file that keeps which way deviations lie shows what is shown when they are found anew.
+#[test]
+fn directional_errors_come_from_a_file() {
+    let p = place();
+    p.generate("scan", "in.ply", 4_000);
+    p.done("encode in.ply in.pm --bounds --directional --any-order -q");
+    let faces = |input: &str, error: &str| {
+        let r =
+            p.done(&format!("fly {input} --path circle --frames 4 --tau 2 --error {error} --json -q")).json();
+        assert_eq!((r["rule"].as_str(), r["error"].as_str()), (Some("rings"), Some(error)));
+        r["faces"]["mean"].as_f64().unwrap()
+    };
+    let kept = faces("in.pm", "directional");
+    assert_eq!(kept, faces("in.ply", "directional"));
+    assert!(kept < faces("in.pm", "uniform"));
 }
 
 /// Geomorphs through `--memory` are those of the whole file, frame by frame.

@@ -384,7 +384,7 @@ pub(super) fn bounds_beside(splits: &Part, bounds: &Bounds, range: std::ops::Ran
         ChunkType::BOUNDS,
         false,
         splits.chunk.mesh,
-        bounds::raw_bytes(bounds.guarantee(), range.len()),
+        bounds::raw_bytes(bounds.guarantee(), bounds.is_directed(), range.len()),
         bytes,
     );
     p.turn = splits.turn;

@@ -125,8 +125,9 @@ fn on_the_way(head: &MeshHead, [c, page]: [&Chunk; 2], room: Room, settled: bool
     let fetched = page.range().end.saturating_sub(c.offset);
     // One after the other, but what was read first is there.
     // And until the page is put together, what it is put together from is there.
-    let turn = 4 * u64::from(settled);
-    let parts = (18 + 24 + pages::SPLIT + size_of::<Packed>() as u64 + turn) * c.count as u64;
+    // Turns, and which way deviations lie.
+    let more = 6 * u64::from(settled);
+    let parts = (18 + 24 + pages::SPLIT + size_of::<Packed>() as u64 + more) * c.count as u64;
     let beside = pages::scratch(c.count, page.raw, settled).max(parts);
     let all = fetched.saturating_add(room.bytes(head, c)).saturating_add(beside);
     usize::try_from(all).unwrap_or(usize::MAX / 4)
