@@ -204,6 +204,6 @@ fn a_file_keeps_which_way_deviations_lie() {
             let uniform = faces(&h, Lens::new(&h, &c, &DMat4::IDENTITY, 1.0, Cull::All).unwrap());
             fewer += uniform - directional;
         }
-        assert!(fewer > 100, "{fewer}");
+        assert!(fewer > 20, "{fewer}");
     }
 }

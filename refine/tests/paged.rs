@@ -4,11 +4,11 @@ mod common;
 
 use common::{NAMES, Random, assert_same, options, sample};
 use glam::{DMat4, DVec3};
-use progmesh_refine::aif::{MeshInput, NONE};
+use progmesh_refine::aif::{BuildOptions, Mesh, MeshInput, NONE, Positions};
 use progmesh_refine::format::{
     ByteRanges, ChunkType, EncodeError, EncodeOptions, FormatError, RangeReader, decode, encode,
 };
-use progmesh_refine::hierarchy::{self, Bounds, Hierarchy, Rule};
+use progmesh_refine::hierarchy::{self, Bounds, Guarantee, Hierarchy, Rule};
 use progmesh_refine::paged::{PagedError, PagedLimits, PagedView};
 use progmesh_refine::progressive::build;
 use progmesh_refine::selective::{Cull, Done, Lens, Limits, TimedMorph, View};
@@ -172,8 +172,37 @@ fn the_same_meshes_as_in_memory_frame_by_frame() {
         }
         fly(&file_by(rule, 512, "scan", 6000, Some(Placement::Endpoint)), PLENTY, 6);
     }
+    // With places on a coarser grid, by passes of another method, and of a mesh in pieces with places in double precision.
+    let o = EncodeOptions::default().with_pages(true).with_chunk(Some(300));
+    fly(&written(sample("scan", 3000, 5), Method::Quadric, &o.clone().with_quantize(Some(11))), PLENTY, 6);
+    fly(&written(sample("torus", 3000, 5), Method::Nsa, &o), PLENTY, 6);
+    fly(&written(pieces(), Method::Quadric, &o), PLENTY, 6);
     // Many chunks, each of a few splits: what is needed is mostly in others.
     fly(&file_by(Rule::Rings, 24, "scan", 3000, None), PLENTY, 6);
+}
+
+/// A file with pages by the ring rule.
+fn written(mesh: Mesh, method: Method, o: &EncodeOptions) -> Vec<u8> {
+    let mut pm = build(mesh, &options(method, None), &Quiet).unwrap().mesh;
+    pm.bounds = Some(Arc::new(Bounds::measure(&pm, &hierarchy::Options::RINGS).unwrap()));
+    assert_eq!(pm.bounds.as_ref().unwrap().guarantee(), Guarantee::Settled);
+    encode(&[pm], &[], &[], o).unwrap()
+}
+
+/// A sheet with a border, a closed surface and one with a handle, side by side.
+fn pieces() -> Mesh {
+    let mut all = MeshInput { positions: Positions::F64(Vec::new()), ..Default::default() };
+    let Positions::F64(places) = &mut all.positions else { panic!("double") };
+    for (k, name) in ["scan", "sphere", "torus"].into_iter().enumerate() {
+        let m = sample(name, 1200, 7 + k as u64).to_input();
+        let (low, high) = m.positions.bounds().unwrap();
+        let (first, size) = (places.len() as u32, (high - low).max_element());
+        let at = |p: DVec3| ((p - low) / size * 1.1 + DVec3::X * 1.3 * k as f64).to_array();
+        places.extend(m.positions.iter().map(at));
+        let triangles = m.corners.chunks_exact(3).flat_map(|t| [t[0], t[1], t[2]]);
+        all.corners.extend(triangles.map(|v| first + v));
+    }
+    Mesh::build(all, &BuildOptions::default()).unwrap().0
 }
 
 /// The least limit.
