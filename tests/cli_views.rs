@@ -107,7 +107,10 @@ fn regions_and_cameras_that_are_none_are_refused() {
     p.generate("sphere", "in.obj", 100);
     p.run("clip in.obj out.obj").failed(2, "--box");
     p.run("clip in.obj out.obj --box=1,0,0,0,1,1").failed(2, "least corner");
-    p.run("clip in.obj out.obj --box=1,0,0").failed(2, "6 numbers");
+    p.run("clip in.obj out.obj --box=1,0,0").failed(2, "6 numbers with commas between them: these are 3");
+    p.run("clip in.obj out.obj --box=nan").failed(2, "\"nan\" is not finite");
+    p.run("clip in.obj out.obj --box=0,0,0,1,1,-inf").failed(2, "\"-inf\" is not finite");
+    p.run("clip in.obj out.obj --box=0,0,0,1,1,").failed(2, "\"\" is none");
     p.run("clip in.obj out.obj --plane 0,0,0,1").failed(2, "not all be 0");
     p.run("clip in.obj out.obj --plane 0,nan,0,1").failed(2, "4 numbers");
     for (k, (field, value)) in [

@@ -2,9 +2,14 @@
 //! lets changes through to the streams. What the bytes are decides which way they are read, so that a run is short and every way has its turn.
 #![no_main]
 
+use glam::{DMat4, DVec3};
 use libfuzzer_sys::fuzz_target;
 use progmesh_refine::ProgressiveMesh;
 use progmesh_refine::format::{EncodeOptions, PmReader, RangeReader, decode_prefix, encode};
+use progmesh_refine::paged::{PagedLimits, PagedView};
+use progmesh_refine::selective::Cull;
+use progmesh_refine::view::{Camera, CameraParameters, Projection};
+use std::sync::Arc;
 
 /// Meshes of more splits are not written again.
 const WRITTEN: usize = 64;
@@ -20,7 +25,8 @@ fuzz_target!(|bytes: &[u8]| {
 fn read(bytes: &[u8], turn: u32) {
     match turn & 7 {
         0 | 1 => in_a_stream(bytes),
-        2 | 3 => alone(bytes),
+        2 => alone(bytes),
+        3 => paged(bytes),
         _ => whole(bytes, turn >> 3),
     }
 }
@@ -66,6 +72,32 @@ fn alone(bytes: &[u8]) {
     for chunk in directory.chunks.iter().rev() {
         let head = heads.get(chunk.mesh as usize).and_then(Option::as_ref);
         let _ = reader.read(chunk.index, head);
+    }
+}
+
+/// Out of core: to full detail, half of it and back, with what changes shown over two frames.
+fn paged(bytes: &[u8]) {
+    let Ok(reader) = RangeReader::new(bytes) else { return };
+    let Ok(mut view) = PagedView::new(Arc::new(reader), 0, 64 << 20) else { return };
+    let (centre, diagonal) = view.extent();
+    let size = diagonal.clamp(1e-9, 1e9);
+    let camera = Camera::new(&CameraParameters {
+        eye: centre + DVec3::new(0.1, 0.2, 1.0) * size,
+        target: centre,
+        up: DVec3::Y,
+        projection: Projection::Perspective { fov_y_deg: 45.0 },
+        width: 640,
+        height: 480,
+        near: 1e-3 * size,
+        far: 1e3 * size,
+    });
+    let Ok(camera) = camera else { return };
+    for tau in [2.0, 0.0, 8.0, f64::INFINITY] {
+        let Ok(lens) = view.lens(&camera, &DMat4::IDENTITY, tau, Cull::None) else { return };
+        let adapted = view.adapt(&[lens], &PagedLimits::default()).is_ok();
+        if view.set_timed(Some(2)).is_err() || view.follow(&[lens]).is_err() || !adapted {
+            return;
+        }
     }
 }
 

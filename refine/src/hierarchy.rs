@@ -17,6 +17,7 @@ mod deviation;
 mod directions;
 mod estimate;
 mod forest;
+mod further;
 mod nearest;
 mod offsets;
 mod order;
@@ -30,6 +31,7 @@ pub(crate) use bounds::{Packed, pack_up, unpack};
 pub(crate) use cone::Cone;
 pub(crate) use directions::{CHANGE, DEPTH, Direction};
 pub(crate) use forest::Forest;
+pub(crate) use further::Further;
 pub(crate) use rows::SplitRows;
 pub(crate) use tree::Tree;
 

@@ -32,6 +32,7 @@ pub use shelf::Traffic;
 
 use crate::aif::NONE;
 use crate::format::{ByteRanges, FormatError, RangeReader};
+use crate::hierarchy::Rule;
 use crate::progressive::{Damage, Fans};
 use crate::selective::{Clocks, Cull, Due, Entry, Followed, Lens, LensError, Motions};
 use crate::view::Camera;
@@ -212,6 +213,11 @@ impl<S: ByteRanges> PagedView<S> {
     /// The middle of the box about the finest mesh's vertices, and the length of its diagonal.
     pub fn extent(&self) -> (DVec3, f64) {
         (self.shelf.base.links.origin, self.shelf.base.links.diagonal)
+    }
+
+    /// When splits may be made: what the file's bounds are for.
+    pub fn rule(&self) -> Rule {
+        if self.shelf.by_rings() { Rule::Rings } else { Rule::Cuts }
     }
 
     /// A lens for this mesh; see [`Lens::new`].

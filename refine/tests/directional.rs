@@ -4,7 +4,8 @@ mod common;
 
 use common::{Random, any_camera, least_closed, progressive};
 use glam::{DMat4, DVec3};
-use progmesh_refine::hierarchy::{Guarantee, Hierarchy, Options};
+use progmesh_refine::format::{EncodeOptions, decode, encode};
+use progmesh_refine::hierarchy::{Bounds, Guarantee, Hierarchy, Options};
 use progmesh_refine::selective::{Cull, Lens, Limits, View};
 use progmesh_refine::simplify::Method;
 use progmesh_refine::view::{Camera, CameraParameters, Projection};
@@ -174,4 +175,35 @@ fn where_directions_are_not_known_or_angles_change_all_counts() {
     let moved = bounds.after_moving(h.mesh(), 1e-3 * h.extent().1).unwrap();
     assert!(moved.has_directions() && bounds.slice(0..9).has_directions());
     assert_eq!(bounds.bytes(), without.all_bounds().bytes() + 2 * h.splits());
+}
+
+#[test]
+fn a_file_keeps_which_way_deviations_lie() {
+    let options = Options::RINGS.with_directions(true);
+    let mut pm = progressive("scan", 3000, Method::Quadric, None);
+    let own = Arc::new(Hierarchy::new(Arc::new(pm.clone()), &options).unwrap());
+    pm.bounds = Some(Arc::new(Bounds::measure(&pm, &options).unwrap()));
+    let plain = EncodeOptions::default().with_chunk(Some(500));
+    for file in [plain.clone(), plain.clone().with_sequential(true), plain.with_pages(true)] {
+        let bytes = encode(std::slice::from_ref(&pm), &[], &[], &file).unwrap();
+        let read = decode(&bytes).unwrap().meshes.remove(0);
+        assert!(read.bounds.as_ref().is_some_and(|b| b.has_directions()));
+        let h = Arc::new(Hierarchy::new(Arc::new(read), &Options::RINGS).unwrap());
+        assert!(h.all_bounds().has_directions());
+        let mut random = Random(9);
+        let mut fewer = 0;
+        for round in 0..8 {
+            let c = camera(&own, &mut random, round);
+            let faces = |h: &Arc<Hierarchy>, lens: Lens| {
+                let mut view = View::new(h.clone());
+                assert!(view.adapt(&lens, &Limits::default()).complete);
+                view.face_count()
+            };
+            let directional = faces(&h, lens(&h, &c, 1.0, Cull::All));
+            assert_eq!(directional, faces(&own, lens(&own, &c, 1.0, Cull::All)), "round {round}");
+            let uniform = faces(&h, Lens::new(&h, &c, &DMat4::IDENTITY, 1.0, Cull::All).unwrap());
+            fewer += uniform - directional;
+        }
+        assert!(fewer > 20, "{fewer}");
+    }
 }

@@ -6,7 +6,7 @@ use common::{NAMES, assert_same, input_of, options, sample};
 use progmesh_meshes::{GenerateOptions, Sample, generate};
 use progmesh_refine::aif::*;
 use progmesh_refine::format::*;
-use progmesh_refine::hierarchy::{Bounds, Guarantee};
+use progmesh_refine::hierarchy::{Bounds, Guarantee, Options as HierarchyOptions};
 use progmesh_refine::progressive::{Damage, build, build_all, same_positions};
 use progmesh_refine::simplify::{Method, Options, Placement, Quiet};
 use progmesh_refine::{Hierarchy, ProgressiveMesh};
@@ -255,9 +255,14 @@ fn victims() -> [Vec<u8>; 3] {
         let meshes = vec![sample("scan", a, 1), sample("polygons", b, 1), sample("cad", c, 1)];
         let mut all = build_all(meshes, &[1.0; 3], &Options::default(), &Quiet).unwrap();
         let paged = k == 2;
-        for pm in all.meshes.iter_mut().skip(if paged { 0 } else { 2 }) {
+        for (m, pm) in all.meshes.iter_mut().enumerate().skip(if paged { 0 } else { 2 }) {
             let given = vec![0.25; pm.splits.len()];
-            pm.bounds = Some(Arc::new(Bounds::with_errors(pm, &given, Guarantee::Proven).unwrap()));
+            let bounds = match (paged, m) {
+                (true, 0) => Bounds::measure(pm, &Default::default()).unwrap(),
+                _ => Bounds::with_errors(pm, &given, Guarantee::Proven).unwrap(),
+            };
+            assert_eq!(bounds.guarantee() == Guarantee::Settled, paged && m == 0);
+            pm.bounds = Some(Arc::new(bounds));
         }
         let mut options = EncodeOptions::default().with_chunk(Some(40)).with_sequential(sequential);
         if paged {
@@ -298,15 +303,6 @@ fn walk(decoded: &Decoded) {
         let _ = c.to_ordered_input();
         c.seek(0).unwrap();
     }
-}
-
-/// Head and directory with their checksum set right.
-fn sign(bytes: &mut [u8]) {
-    let end = 48 + 64 * u32::from_le_bytes(bytes[24..28].try_into().unwrap()) as usize;
-    let mut h = crc32fast::Hasher::new();
-    h.update(&bytes[..44]);
-    h.update(&bytes[48..end]);
-    bytes[44..48].copy_from_slice(&h.finalize().to_le_bytes());
 }
 
 #[test]
@@ -456,7 +452,7 @@ fn change_places(bytes: &[u8]) {
             out.extend_from_slice(&bytes[r.start as usize..r.end as usize]);
         }
         out[32..40].copy_from_slice(&at.to_le_bytes());
-        sign(&mut out);
+        common::sign_directory(&mut out);
         out
     };
     let all: Vec<usize> = (0..n).collect();
@@ -523,7 +519,7 @@ fn lie_about_sizes(bytes: &[u8]) {
                     continue;
                 }
                 bad[at..at + 4].copy_from_slice(&value.to_le_bytes());
-                sign(&mut bad);
+                common::sign_directory(&mut bad);
                 match decode_prefix(&bad) {
                     Ok(d) => walk(&d),
                     Err(e) => assert!(!e.to_string().is_empty()),
@@ -551,10 +547,7 @@ fn lie_within(bytes: &[u8]) {
             for change in [0x01, 0xFF] {
                 let mut bad = bytes.to_vec();
                 bad[at as usize] ^= change;
-                let sum = crc32fast::hash(&bad[r.start as usize..r.end as usize]);
-                let entry = 48 + 64 * c.index as usize;
-                bad[entry + 36..entry + 40].copy_from_slice(&sum.to_le_bytes());
-                sign(&mut bad);
+                common::sign(&mut bad, c);
                 walk(&decode_prefix(&bad).unwrap());
             }
         }
@@ -656,6 +649,13 @@ fn the_corpus_is_written_anew() {
     write("grid_quantised.pm", one(&grid, &small.clone().with_quantize(Some(8)).with_any_order(true)));
     write("grid_sequential.pm", one(&grid, &small.clone().with_sequential(true)));
     write("grid_whole.pm", one(&grid, &EncodeOptions::default()));
+    let mut grid = grid;
+    for (name, rule) in
+        [("grid_paged_rings.pm", HierarchyOptions::RINGS), ("grid_paged_cuts.pm", HierarchyOptions::CUTS)]
+    {
+        grid.bounds = Some(Arc::new(Bounds::measure(&grid, &rule).unwrap()));
+        write(name, one(&grid, &small.clone().with_any_order(true).with_pages(true)));
+    }
     let seams = build(sample("cad", 60, 1), &runs()[1], &Quiet).unwrap().mesh;
     write("seams.pm", one(&seams, &small));
     write("seams_sequential.pm", one(&seams, &small.clone().with_sequential(true)));

@@ -2,17 +2,20 @@
 
 mod common;
 
-use common::{NAMES, assert_same, options, sample};
+use common::{NAMES, Random, assert_same, options, sample};
 use glam::{DMat4, DVec3};
+use progmesh_refine::aif::{BuildOptions, Mesh, MeshInput, NONE, Positions};
 use progmesh_refine::format::{
     ByteRanges, ChunkType, EncodeError, EncodeOptions, FormatError, RangeReader, decode, encode,
 };
-use progmesh_refine::hierarchy::{self, Bounds, Hierarchy};
+use progmesh_refine::hierarchy::{self, Bounds, Guarantee, Hierarchy, Rule};
 use progmesh_refine::paged::{PagedError, PagedLimits, PagedView};
 use progmesh_refine::progressive::build;
 use progmesh_refine::selective::{Cull, Done, Lens, Limits, TimedMorph, View};
+use progmesh_refine::simplify::measure::Surface;
 use progmesh_refine::simplify::{Method, Placement, Quiet};
 use progmesh_refine::view::{Camera, CameraParameters, Projection};
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -21,12 +24,20 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 const TAU: [f64; 3] = [1.0, 6.0, 12.0];
 const PLENTY: usize = 1 << 30;
 
-/// A file with pages; small meshes, so bounds are measured in little.
+/// A file with pages by the ring rule.
 fn file(name: &str, faces: usize, placement: Option<Placement>) -> Vec<u8> {
+    file_by(Rule::Rings, 512, name, faces, placement)
+}
+
+/// A file with pages by a rule; by that of cuts bounds are measured in little.
+fn file_by(rule: Rule, chunk: u32, name: &str, faces: usize, placement: Option<Placement>) -> Vec<u8> {
     let mut pm = build(sample(name, faces, 5), &options(Method::Quadric, placement), &Quiet).unwrap().mesh;
-    let o = hierarchy::Options::CUTS.with_rounds(0);
+    let o = match rule {
+        Rule::Rings => hierarchy::Options::RINGS,
+        _ => hierarchy::Options::CUTS.with_rounds(0),
+    };
     pm.bounds = Some(Arc::new(Bounds::measure(&pm, &o).unwrap()));
-    let o = EncodeOptions::default().with_any_order(true).with_pages(true).with_chunk(Some(512));
+    let o = EncodeOptions::default().with_any_order(true).with_pages(true).with_chunk(Some(chunk));
     encode(&[pm], &[], &[], &o).unwrap()
 }
 
@@ -42,10 +53,14 @@ fn paged(bytes: &[u8], limit: usize) -> PagedView<&[u8]> {
 }
 
 fn camera(centre: DVec3, diagonal: f64, turn: f64, far: f64) -> Camera {
+    Camera::new(&seen(centre, diagonal, turn, far)).unwrap()
+}
+
+fn seen(centre: DVec3, diagonal: f64, turn: f64, far: f64) -> CameraParameters {
     let eye = centre + far * diagonal * DVec3::new(turn.cos(), turn.sin(), 0.3);
     // From near by it sees a part.
     let fov_y_deg = if far < 0.7 { 12.0 } else { 45.0 };
-    Camera::new(&CameraParameters {
+    CameraParameters {
         eye,
         target: centre + 0.1 * diagonal * DVec3::new(turn.sin(), 0.2, turn.cos()),
         up: DVec3::Z,
@@ -54,24 +69,82 @@ fn camera(centre: DVec3, diagonal: f64, turn: f64, far: f64) -> Camera {
         height: 480,
         near: 1e-3 * diagonal,
         far: 1e3 * diagonal,
-    })
-    .unwrap()
+    }
 }
 
-fn same(view: &View, paged: &PagedView<&[u8]>) {
+/// For every split of the file its number in memory, where the ring rule has them in another order: those of a vertex come in the same order everywhere.
+fn numbers(bytes: &[u8], h: &Hierarchy) -> Vec<u32> {
+    let file = decode(bytes).unwrap().meshes.remove(0);
+    let n0 = file.base_vertices() as u32;
+    let mut times = vec![0u32; file.vertices()];
+    let next = |times: &mut Vec<u32>, v: u32| {
+        times[v as usize] += 1;
+        (v, times[v as usize])
+    };
+    let own: HashMap<_, u32> = h.mesh().splits.vertex.iter().map(|&v| next(&mut times, v)).zip(0..).collect();
+    times.fill(0);
+    let mut vertex: Vec<u32> = (0..n0).collect();
+    let number = |&v: &u32| {
+        let i = own[&next(&mut times, vertex[v as usize])];
+        vertex.push(n0 + i);
+        i
+    };
+    file.splits.vertex.iter().map(number).collect()
+}
+
+/// A corner: where it is, and its attributes.
+type Corner = ([u64; 3], u64, Vec<u32>);
+
+/// The faces of a mesh, however its elements are numbered: corners, the least first, material and group.
+fn faces(m: &MeshInput) -> Vec<([Corner; 3], u32, u32)> {
+    let corner = |k: usize| {
+        let (wedges, w) = (m.wedges.as_ref(), m.wedges.as_ref().map_or(NONE, |w| w.corner[k]));
+        let row = wedges.filter(|_| w != NONE).map(|all| (all.present(w), all.row(w)));
+        let (present, row) = row.unwrap_or((0, &[]));
+        (m.positions.bits(m.corners[k] as usize), present, row.iter().map(|x| x.to_bits()).collect())
+    };
+    let of = |all: &[u32], f: usize| all.get(f).copied().unwrap_or(NONE);
+    let face = |f: usize| {
+        let at = [0, 1, 2].map(|k| corner(3 * f + k));
+        let turns = (0..3).map(|k| [0, 1, 2].map(|j| at[(j + k) % 3].clone()));
+        (turns.min().unwrap(), of(&m.face_material, f), of(&m.face_group, f))
+    };
+    let mut all: Vec<_> = (0..m.corners.len() / 3).map(face).collect();
+    all.sort();
+    all
+}
+
+/// Both show the same splits and the same faces with the same attributes; by the rule of cuts in the same order.
+fn same(view: &View, paged: &PagedView<&[u8]>, numbers: &[u32]) {
     let own: Vec<u32> = view.applied().map(|i| i as u32).collect();
-    assert_eq!(paged.applied_splits().collect::<Vec<_>>(), own);
-    assert_same(&view.to_input(), &paged.to_input());
+    let mut theirs: Vec<u32> = paged.applied_splits().map(|i| numbers[i as usize]).collect();
+    theirs.sort_unstable();
+    assert_eq!(theirs, own);
+    same_faces(paged.rule(), &view.to_input(), &paged.to_input());
     assert_eq!((view.face_count(), view.vertex_count()), (paged.face_count(), paged.vertex_count()));
+}
+
+fn same_faces(rule: Rule, a: &MeshInput, b: &MeshInput) {
+    if rule == Rule::Cuts {
+        return assert_same(a, b);
+    }
+    let places = |m: &MeshInput| {
+        let mut all: Vec<_> = (0..m.positions.len()).map(|v| m.positions.bits(v)).collect();
+        all.sort_unstable();
+        all
+    };
+    assert_eq!((places(a), a.wires.len()), (places(b), b.wires.len()));
+    assert!(faces(a) == faces(b));
 }
 
 /// On one flight both show the same meshes, frame by frame.
 fn fly(bytes: &[u8], limit: usize, frames: usize) -> PagedView<&[u8]> {
     let h = in_memory(bytes);
+    let numbers = numbers(bytes, &h);
     let (centre, diagonal) = h.extent();
     let mut view = View::new(h.clone());
     let mut out = paged(bytes, limit);
-    assert_eq!(out.extent(), (centre, diagonal));
+    assert_eq!((out.extent(), out.rule()), ((centre, diagonal), h.rule()));
     for k in 0..frames {
         let c = camera(centre, diagonal, 0.7 * k as f64, 0.6 + 0.5 * (k % 3) as f64);
         let tau = TAU[k % 3];
@@ -83,17 +156,53 @@ fn fly(bytes: &[u8], limit: usize, frames: usize) -> PagedView<&[u8]> {
         assert_eq!(what(found.done), what(done), "frame {k}");
         assert_eq!((found.no_room, found.postponed), (0, 0), "frame {k}");
         assert!(out.bytes() <= limit);
-        same(&view, &out);
+        same(&view, &out, &numbers);
     }
     out
 }
 
 #[test]
 fn the_same_meshes_as_in_memory_frame_by_frame() {
-    for name in NAMES {
-        fly(&file(name, 3000, None), PLENTY, 4);
+    for rule in [Rule::Rings, Rule::Cuts] {
+        for name in NAMES {
+            let bytes = file_by(rule, 512, name, 3000, None);
+            let out = fly(&bytes, PLENTY, 12);
+            // It moves a vertex between sheets of faces, for which the ring rule is not.
+            assert!(out.rule() == rule || name == "nonmanifold", "{name}");
+        }
+        fly(&file_by(rule, 512, "scan", 6000, Some(Placement::Endpoint)), PLENTY, 6);
     }
-    fly(&file("scan", 6000, Some(Placement::Endpoint)), PLENTY, 6);
+    // With places on a coarser grid, by passes of another method, and of a mesh in pieces with places in double precision.
+    let o = EncodeOptions::default().with_pages(true).with_chunk(Some(300));
+    fly(&written(sample("scan", 3000, 5), Method::Quadric, &o.clone().with_quantize(Some(11))), PLENTY, 6);
+    fly(&written(sample("torus", 3000, 5), Method::Nsa, &o), PLENTY, 6);
+    fly(&written(pieces(), Method::Quadric, &o), PLENTY, 6);
+    // Many chunks, each of a few splits: what is needed is mostly in others.
+    fly(&file_by(Rule::Rings, 24, "scan", 3000, None), PLENTY, 6);
+}
+
+/// A file with pages by the ring rule.
+fn written(mesh: Mesh, method: Method, o: &EncodeOptions) -> Vec<u8> {
+    let mut pm = build(mesh, &options(method, None), &Quiet).unwrap().mesh;
+    pm.bounds = Some(Arc::new(Bounds::measure(&pm, &hierarchy::Options::RINGS).unwrap()));
+    assert_eq!(pm.bounds.as_ref().unwrap().guarantee(), Guarantee::Settled);
+    encode(&[pm], &[], &[], o).unwrap()
+}
+
+/// A sheet with a border, a closed surface and one with a handle, side by side.
+fn pieces() -> Mesh {
+    let mut all = MeshInput { positions: Positions::F64(Vec::new()), ..Default::default() };
+    let Positions::F64(places) = &mut all.positions else { panic!("double") };
+    for (k, name) in ["scan", "sphere", "torus"].into_iter().enumerate() {
+        let m = sample(name, 1200, 7 + k as u64).to_input();
+        let (low, high) = m.positions.bounds().unwrap();
+        let (first, size) = (places.len() as u32, (high - low).max_element());
+        let at = |p: DVec3| ((p - low) / size * 1.1 + DVec3::X * 1.3 * k as f64).to_array();
+        places.extend(m.positions.iter().map(at));
+        let triangles = m.corners.chunks_exact(3).flat_map(|t| [t[0], t[1], t[2]]);
+        all.corners.extend(triangles.map(|v| first + v));
+    }
+    Mesh::build(all, &BuildOptions::default()).unwrap().0
 }
 
 /// The least limit.
@@ -107,11 +216,7 @@ fn needed(bytes: &[u8]) -> usize {
 /// Chunks of few splits repeat many others: more than what is set aside is for. They are read all the same, and the limit is kept.
 #[test]
 fn chunks_that_take_much_on_the_way_are_read() {
-    let mut pm = build(sample("scan", 3000, 5), &options(Method::Quadric, None), &Quiet).unwrap().mesh;
-    let o = hierarchy::Options::CUTS.with_rounds(0);
-    pm.bounds = Some(Arc::new(Bounds::measure(&pm, &o).unwrap()));
-    let o = EncodeOptions::default().with_any_order(true).with_pages(true).with_chunk(Some(6));
-    let bytes = encode(&[pm], &[], &[], &o).unwrap();
+    let bytes = file_by(Rule::Cuts, 6, "scan", 3000, None);
     fly(&bytes, PLENTY, 4);
     let needed = needed(&bytes);
     let mut short = 0;
@@ -130,7 +235,7 @@ fn chunks_that_take_much_on_the_way_are_read() {
 /// Of a mesh of several chunks, read through little memory: what is not shown goes, and comes again.
 #[test]
 fn a_limit_is_kept_and_changes_no_mesh() {
-    let bytes = file("scan", 24_000, None);
+    let bytes = file_by(Rule::Rings, 160, "scan", 24_000, None);
     let roomy = fly(&bytes, PLENTY, 6);
     let all = roomy.traffic();
     assert!(all.bytes_touched <= all.bytes_read && all.bytes_touched <= bytes.len() as u64);
@@ -190,11 +295,15 @@ fn assert_closed(view: &PagedView<&[u8]>) {
 /// What is drawn, and where, is what geomorphs draw in memory, frame by frame: by time and by error.
 #[test]
 fn geomorphs_are_those_in_memory_frame_by_frame() {
-    for (name, placement, faces) in
-        [("scan", Some(Placement::Endpoint), 6000), ("cad", None, 3000), ("polygons", None, 3000)]
-    {
-        let bytes = file(name, faces, placement);
+    let rings = [("scan", Some(Placement::Endpoint), 6000), ("cad", None, 3000), ("polygons", None, 3000)];
+    let cuts = [("scan", None, 3000)];
+    let all = rings.map(|f| (Rule::Rings, f)).into_iter().chain(cuts.map(|f| (Rule::Cuts, f)));
+    for (rule, (name, placement, faces)) in all {
+        let bytes = file_by(rule, 512, name, faces, placement);
         let h = in_memory(&bytes);
+        let numbers = numbers(&bytes, &h);
+        let n0 = h.mesh().base_vertices() as u32;
+        let vertex = |v: u32| v.checked_sub(n0).map_or(v, |i| n0 + numbers[i as usize]);
         let (centre, diagonal) = h.extent();
         let (mut view, mut out) = (View::new(h.clone()), paged(&bytes, PLENTY));
         let mut timed: Option<TimedMorph> = None;
@@ -210,15 +319,18 @@ fn geomorphs_are_those_in_memory_frame_by_frame() {
             let Some(t) = &mut timed else {
                 timed = Some(TimedMorph::new(&view, 5));
                 out.set_timed(Some(5)).unwrap();
-                same(&view, &out);
+                same(&view, &out, &numbers);
                 continue;
             };
             let (want, done) = (t.follow(&view, &lens), out.follow(&lens).unwrap());
             assert_eq!(done, want, "{name} {k}");
-            same(t.view(), &out);
+            same(t.view(), &out, &numbers);
             let places: Vec<(u32, DVec3)> = t.displaced().collect();
-            assert_eq!(out.displaced().collect::<Vec<_>>(), places, "{name} {k}");
-            assert_same(&t.view().to_input_with(&places), &out.to_input_with(&places));
+            let own: Vec<(u32, DVec3)> = out.displaced().collect();
+            let mut theirs: Vec<_> = own.iter().map(|&(v, p)| (vertex(v), p)).collect();
+            theirs.sort_unstable_by_key(|d| d.0);
+            assert_eq!(theirs, places, "{name} {k}");
+            same_faces(out.rule(), &t.view().to_input_with(&places), &out.to_input_with(&own));
             assert_closed(&out);
             moving += done.morphing;
             lingering += out.face_count() - out.needed_faces();
@@ -226,13 +338,13 @@ fn geomorphs_are_those_in_memory_frame_by_frame() {
                 for v in out.vertices() {
                     let own = out.morphed_by_all(&lens, v, 2.0);
                     by_error += usize::from(own != out.position(v));
-                    assert_eq!(own, t.view().morphed_by_all(&lens, v, 2.0));
+                    assert_eq!(own, t.view().morphed_by_all(&lens, vertex(v), 2.0));
                 }
             }
         }
         assert!(moving > 100 && lingering > 100 && by_error > 20, "{name}: {moving} {lingering} {by_error}");
         // It has stood still for long enough.
-        same(&view, &out);
+        same(&view, &out, &numbers);
         assert_eq!((out.displaced().count(), out.needed_faces()), (0, out.face_count()));
         // Whatever is on the way is there at once when it is told to.
         for (tau, settle) in [(9.0, true), (1.0, false)] {
@@ -243,7 +355,7 @@ fn geomorphs_are_those_in_memory_frame_by_frame() {
             out.adapt(&lens, &PagedLimits::default()).unwrap();
             assert!(out.follow(&lens).unwrap().morphing > 0);
             if settle { out.settle().map(|_| ()) } else { out.set_timed(None) }.unwrap();
-            same(&view, &out);
+            same(&view, &out, &numbers);
             assert!(out.displaced().count() == 0);
         }
     }
@@ -366,6 +478,7 @@ fn geomorphs_keep_the_limit() {
 fn a_few_fetches_a_frame_lead_to_the_same_mesh() {
     let bytes = file("scan", 24_000, None);
     let h = in_memory(&bytes);
+    let numbers = numbers(&bytes, &h);
     let (centre, diagonal) = h.extent();
     let c = camera(centre, diagonal, 0.3, 0.7);
     let mut view = View::new(h.clone());
@@ -384,7 +497,7 @@ fn a_few_fetches_a_frame_lead_to_the_same_mesh() {
         }
     }
     assert!(faces.len() > 3 && faces.is_sorted(), "{faces:?}");
-    same(&view, &out);
+    same(&view, &out, &numbers);
 }
 
 #[test]
@@ -392,6 +505,7 @@ fn it_shows_all_there_is_and_goes_back_to_the_base() {
     for (name, placement) in [("scan", Some(Placement::Endpoint)), ("cad", None), ("terrain", None)] {
         let bytes = file(name, 8000, placement);
         let h = in_memory(&bytes);
+        let numbers = numbers(&bytes, &h);
         let (centre, diagonal) = h.extent();
         let c = camera(centre, diagonal, 1.0, 1.0);
         let (mut view, mut out) = (View::new(h.clone()), paged(&bytes, PLENTY));
@@ -400,7 +514,7 @@ fn it_shows_all_there_is_and_goes_back_to_the_base() {
             let lens = Lens::new(&h, &c, &DMat4::IDENTITY, tau, Cull::None).unwrap();
             view.adapt(&lens, &Limits::default());
             out.adapt(&[lens], &PagedLimits::default()).unwrap();
-            same(&view, &out);
+            same(&view, &out, &numbers);
             if tau == 0.0 {
                 assert_eq!((out.applied(), out.face_count()), (out.splits(), out.full_faces()));
             }
@@ -441,7 +555,7 @@ fn limits_of_faces_and_operations_are_kept() {
 
 #[test]
 fn a_near_view_reads_a_part_of_the_file() {
-    let bytes = file("terrain", 50_000, None);
+    let bytes = file_by(Rule::Cuts, 512, "terrain", 50_000, None);
     let mut out = paged(&bytes, PLENTY);
     let begun = out.traffic().bytes_read;
     assert!(begun < bytes.len() as u64 / 8, "{begun} of {}", bytes.len());
@@ -486,14 +600,122 @@ fn what_cannot_be_paged_is_told() {
     }
 }
 
+/// Pixels that a place of the finest mesh is off at most, of those that the frustum holds, by code of its own.
+fn measured(samples: &[DVec3], shown: &MeshInput, c: &CameraParameters) -> f64 {
+    let faces: Vec<[u32; 3]> = shown.corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+    let surface = Surface::new(&shown.positions, &faces).unwrap();
+    let mut query = surface.query();
+    let forward = (c.target - c.eye).normalize();
+    let right = forward.cross(c.up).normalize();
+    let up = right.cross(forward);
+    let Projection::Perspective { fov_y_deg } = c.projection else { panic!("seen from a point") };
+    let slope = (0.5 * fov_y_deg.to_radians()).tan();
+    let (pixels, aspect) = (0.5 * f64::from(c.height) / slope, f64::from(c.width) / f64::from(c.height));
+    let off = samples.iter().map(|&p| {
+        let v = p - c.eye;
+        let depth = v.dot(forward);
+        let inside = depth > c.near
+            && v.dot(up).abs() <= depth * slope
+            && v.dot(right).abs() <= depth * slope * aspect;
+        if inside { pixels * query.distance(p) / depth } else { 0.0 }
+    });
+    off.fold(0.0, f64::max)
+}
+
+/// Vertices and places on faces of full detail.
+fn samples(bytes: &[u8]) -> Vec<DVec3> {
+    let pm = decode(bytes).unwrap().meshes.remove(0);
+    let mut full = pm.cursor().unwrap();
+    full.seek(usize::MAX).unwrap();
+    let mut random = Random(17);
+    let mut out: Vec<DVec3> = (0..full.positions().len()).map(|v| full.positions().get(v)).collect();
+    for t in full.indices() {
+        let [a, b, c] = t.map(|w| full.positions().get(full.wedge_vertex(w) as usize));
+        for _ in 0..3 {
+            let (u, v) = (random.unit(), random.unit());
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            out.push(a + (b - a) * u + (c - a) * v);
+        }
+    }
+    out
+}
+
+/// From a file by the ring rule: nowhere farther off than the tolerance, and that not by showing too much.
+#[test]
+fn no_place_is_off_by_more_than_the_tolerance() {
+    let mut ratios = Vec::new();
+    for (name, faces) in [("scan", 4000), ("torus", 4000), ("quad-sphere", 3000), ("terrain", 4000)] {
+        let bytes = file(name, faces, None);
+        let samples = samples(&bytes);
+        let mut out = paged(&bytes, PLENTY);
+        assert_eq!(out.rule(), Rule::Rings);
+        let (centre, diagonal) = out.extent();
+        for k in 0..12 {
+            let c = seen(centre, diagonal, 0.7 * k as f64, 0.4 + 0.4 * (k % 3) as f64);
+            let tau = [0.5, 2.0, 4.0, 8.0][k % 4];
+            let camera = Camera::new(&c).unwrap();
+            let lens = out.lens(&camera, &DMat4::IDENTITY, tau, Cull::Frustum).unwrap();
+            assert!(out.adapt(&[lens], &PagedLimits::default()).unwrap().done.complete);
+            let ratio = measured(&samples, &out.to_input(), &c) / tau;
+            assert!(ratio <= 1.0, "{name} in frame {k}: {ratio}");
+            // Where all there is is shown nothing is off.
+            if out.applied() < out.splits() {
+                ratios.push(ratio);
+            }
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    assert!(ratios.len() > 30 && ratios[ratios.len() / 2] > 0.7, "{ratios:.2?}");
+}
+
+/// Contents of pages and bounds that lie under a right checksum: an error, or some closed mesh, and no panic.
+#[test]
+fn pages_that_lie_are_no_panic() {
+    let (mut told, mut shown) = (0, 0);
+    for rule in [Rule::Rings, Rule::Cuts] {
+        let bytes = file_by(rule, 60, "scan", 400, None);
+        let chunks = RangeReader::new(&bytes[..]).unwrap().directory().chunks.clone();
+        for c in chunks.iter().filter(|c| [ChunkType::PAGE, ChunkType::BOUNDS].contains(&c.kind)) {
+            for at in c.range().step_by(5) {
+                let mut bad = bytes.clone();
+                bad[at as usize] ^= [0x01, 0x80, 0xFF, 0x10][at as usize % 4];
+                common::sign(&mut bad, c);
+                let Ok(mut out) = PagedView::new(Arc::new(RangeReader::new(&bad[..]).unwrap()), 0, PLENTY)
+                else {
+                    told += 1;
+                    continue;
+                };
+                let (centre, diagonal) = out.extent();
+                let c = camera(centre, diagonal.clamp(1e-9, 1e9), 0.3, 0.9);
+                for (k, tau) in [1.0, 0.0, 3.0, f64::INFINITY].into_iter().enumerate() {
+                    let Ok(lens) = out.lens(&c, &DMat4::IDENTITY, tau, Cull::None) else { break };
+                    let done = out.adapt(&[lens], &PagedLimits::default());
+                    told += usize::from(done.is_err());
+                    if k == 0 {
+                        _ = out.set_timed(Some(2));
+                    }
+                    shown += usize::from(out.follow(&[lens]).is_ok() && done.is_ok());
+                    assert_closed(&out);
+                }
+            }
+        }
+    }
+    assert!(told > 100 && shown > 100, "{told} {shown}");
+}
+
 /// Every byte of a chunk turned over is an error that names it, or changes nothing: checksums stand before all else.
 #[test]
 fn damage_is_an_error() {
-    let bytes = file("torus", 4000, None);
-    let reader = RangeReader::new(&bytes[..]).unwrap();
+    for rule in [Rule::Rings, Rule::Cuts] {
+        damaged(&file_by(rule, 512, "torus", 4000, None));
+    }
+}
+
+fn damaged(bytes: &[u8]) {
+    let reader = RangeReader::new(bytes).unwrap();
     let chunks = reader.directory().chunks.clone();
     for c in chunks.iter().filter(|c| c.stored > 0) {
-        let mut bad = bytes.clone();
+        let mut bad = bytes.to_vec();
         bad[(c.offset + c.stored / 2) as usize] ^= 0x10;
         let reader = Arc::new(RangeReader::new(&bad[..]).unwrap());
         let result = PagedView::new(reader, 0, PLENTY).and_then(|mut view| {

@@ -43,10 +43,14 @@ pub(crate) struct Args {
 }
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let wrong = || format!("must be {N} numbers with commas between them");
-    let list: Option<Vec<f64>> =
-        text.split(',').map(|t| t.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
-    list.and_then(|l| <[f64; N]>::try_from(l).ok()).ok_or_else(wrong)
+    let wrong = |what: String| format!("must be {N} numbers with commas between them: {what}");
+    let number = |t: &str| match t.trim().parse::<f64>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        Ok(_) => Err(wrong(format!("{t:?} is not finite"))),
+        Err(_) => Err(wrong(format!("{t:?} is none"))),
+    };
+    let list = text.split(',').map(number).collect::<Result<Vec<f64>, _>>()?;
+    <[f64; N]>::try_from(list).map_err(|l| wrong(format!("these are {}", l.len())))
 }
 
 fn plane(text: &str) -> Result<[f64; 4], String> {

@@ -44,9 +44,12 @@ pub(crate) struct Args {
     /// Measure and write what view-dependent refinement decides by, so that extract and fly begin at once: 5 to 7 bytes a vertex
     #[arg(long, help_heading = "File")]
     bounds: bool,
-    /// Measure and write what extract and fly need for --memory: wider bounds than those of --bounds, and links between the chunks
+    /// Measure and write what extract and fly need for --memory: what --bounds writes, and links between the chunks: 9 to 11 bytes a vertex
     #[arg(long, help_heading = "File", conflicts_with_all = ["sequential", "bounds"])]
     paged: bool,
+    /// With --bounds or --paged: also which way deviations lie, so that extract and fly --error directional begin at once: 1 to 2 bytes a vertex more
+    #[arg(long, help_heading = "File")]
+    directional: bool,
     #[command(flatten)]
     ending: PmEnding,
 }
@@ -61,6 +64,11 @@ fn bits(text: &str) -> Result<u32, String> {
 impl Args {
     pub(crate) fn run(self) -> Result<(), Failure> {
         let start = Instant::now();
+        if self.directional && !self.bounds && !self.paged {
+            return Err(Failure::Usage(
+                "--directional goes with --bounds or --paged: it is about what they write".into(),
+            ));
+        }
         let job = self.making.job()?;
         let out = self.ending.begin()?;
         let file = self.input.name();
@@ -87,14 +95,9 @@ impl Args {
             let mut built = built;
             let measuring = Instant::now();
             if self.bounds || self.paged {
-                // Out of core, rings are not all at hand.
-                let options = match self.paged {
-                    true => hierarchy::Options::CUTS,
-                    false => hierarchy::Options::RINGS,
-                };
                 built
                     .scene
-                    .measure_bounds(&options)
+                    .measure_bounds(&hierarchy::Options::RINGS.with_directions(self.directional))
                     .map_err(|(m, e)| Failure::Input(format!("{file}: mesh {m}: {e}")))?;
                 if interrupt.is_set() {
                     return Err(Failure::Interrupted);

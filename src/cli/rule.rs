@@ -6,7 +6,7 @@ use progmesh::progressive::ProgressiveScene;
 use progmesh::refine::hierarchy::{Guarantee, Options, Rule};
 use progmesh::refine::selective::View;
 use progmesh::refine::truly::Guarded;
-use progmesh::selective::{Deviation, SelectiveScene};
+use progmesh::selective::{Deviation, PagedScene, SelectiveScene};
 use serde::Serialize;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -54,9 +54,6 @@ impl RuleArgs {
     pub(crate) fn check(&self, memory: bool) -> Result<(), Failure> {
         let wrong = |text: &str| Err(Failure::Usage(text.into()));
         match self.rule {
-            Some(RuleName::Rings) if memory => wrong(
-                "--memory and --rule rings do not go together: what a file says for reading in parts is for the rule of cuts",
-            ),
             Some(RuleName::Truly) if memory => wrong(
                 "--memory and --rule truly do not go together: that rule looks at parts of the mesh that are not shown, which are not read then",
             ),
@@ -67,8 +64,8 @@ impl RuleArgs {
             Some(RuleName::Cuts | RuleName::Truly) => wrong(
                 "--error directional is for --rule rings: by the other rules it is not known which way deviations lie",
             ),
-            None if memory => wrong(
-                "--memory and --error directional do not go together: what is read in parts has the rule of cuts, and does not know which way deviations lie",
+            _ if memory => wrong(
+                "--memory and --error directional do not go together: what is read in parts does not know which way deviations lie",
             ),
             _ => Ok(()),
         }
@@ -129,6 +126,24 @@ impl RuleArgs {
         }
         let options = if self.rule == Some(RuleName::Cuts) { Options::CUTS } else { Options::default() };
         options.with_directions(directional)
+    }
+
+    /// The rule by which a file is refined that is read in parts, as reports call it: what its bounds are for.
+    ///
+    /// Fails if another was asked for.
+    pub(crate) fn name_of_paged(&self, scene: &PagedScene, file: &str) -> Result<&'static str, Failure> {
+        let name = if scene.rule() == Rule::Rings { "rings" } else { "cuts" };
+        let other = match self.rule {
+            Some(RuleName::Rings) => name != "rings",
+            Some(RuleName::Cuts) => name != "cuts",
+            _ => false,
+        };
+        match other {
+            true => Err(Failure::Input(format!(
+                "{file}: what it says for reading in parts is for the rule of {name}: leave --rule out, or --memory"
+            ))),
+            false => Ok(name),
+        }
     }
 
     /// The rule by which `scene` is refined, as reports call it: of several meshes the weakest.

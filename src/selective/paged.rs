@@ -7,7 +7,7 @@ use crate::io::DecodeError;
 use crate::io::grid::ReadAt;
 use crate::io::pm::{self, Extent, Shelled};
 use crate::refine::format::{ByteRanges, ChunkType, FormatError, RangeReader};
-use crate::refine::hierarchy::Guarantee;
+use crate::refine::hierarchy::{Guarantee, Rule};
 use crate::refine::paged::{PagedDone, PagedError, PagedLimits, PagedView, Traffic};
 use crate::refine::selective::{Cull, Lens, LensError, Limits};
 use crate::refine::view::Camera;
@@ -160,6 +160,14 @@ impl PagedScene {
             shell_bytes,
             chunks,
         })
+    }
+
+    /// When splits may be made: what the file's bounds are for; of several meshes the weakest.
+    pub fn rule(&self) -> Rule {
+        match self.views.iter().all(|v| v.rule() == Rule::Rings) {
+            true => Rule::Rings,
+            false => Rule::Cuts,
+        }
     }
 
     /// Back to the bases, as if nothing had been shown or read.

@@ -2,13 +2,18 @@
 //!
 //! What a chunk's splits lead to in later chunks stands there with its bounds: so whether a split is needed is decided before its chunk is there.
 
+mod further;
+
+pub(crate) use further::Lists;
+
 use super::base::MeshHead;
 use super::bounds::{self, Parts};
 use super::coder::{Bit, Coder, Decoder, Encoder, Number};
 use crate::aif::NONE;
-use crate::hierarchy::{Bounds, Packed, Tree};
+use crate::hierarchy::{Bounds, Further, Guarantee, Packed, Tree};
 use glam::DVec3;
 use rustc_hash::FxHashMap;
+use std::ops::Range;
 
 /// What the splits of a chunk replace, and what replaces them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,6 +24,8 @@ pub(crate) struct Links {
     pub(crate) next: Vec<[u32; 2]>,
     /// Splits of later chunks that replace nodes made here, ascending, and their bounds.
     pub(crate) outside: Vec<(u32, Packed)>,
+    /// What splits need by the ring rule beside what their cuts do: none of other rules.
+    pub(crate) further: Lists,
 }
 
 /// The same of the vertices of a base.
@@ -32,6 +39,8 @@ pub(crate) struct BaseLinks {
     pub(crate) next: Vec<u32>,
     /// Its bounds.
     pub(crate) bounds: Vec<Packed>,
+    /// Bounds are for the ring rule.
+    pub(crate) settled: bool,
 }
 
 /// Bytes in memory: of a split, of a split of a later chunk, of a base, and of one of its vertices.
@@ -39,12 +48,16 @@ pub(crate) const SPLIT: u64 = 12;
 pub(crate) const OUTSIDE: u64 = 12;
 const BASE: u64 = 32;
 const VERTEX: u64 = 12;
+/// Of a list of what a split needs and of its turn, and of one split in such a list.
+const LIST: u64 = 8;
+const NEED: u64 = 4;
 
 /// Bytes that reading the `PAGE` of so many splits takes at most on the way, besides what comes of it: the list of splits of later chunks grows, and has what it grew from beside it;
 /// a table of vertices, and the nodes made.
-pub(crate) fn scratch(count: u32, raw: u64) -> u64 {
+pub(crate) fn scratch(count: u32, raw: u64, settled: bool) -> u64 {
     let count = count as u64;
-    2 * raw.saturating_sub(SPLIT * count) + 48 * count + (1 << 14)
+    // By the ring rule, then, an order of descent, and one by turns.
+    2 * raw.saturating_sub(SPLIT * count) + (48 + further::SCRATCH * u64::from(settled)) * count + (1 << 14)
 }
 
 /// Models of one chunk.
@@ -91,6 +104,37 @@ pub(super) trait Source {
 
     /// The bounds of a split that replaces a node.
     fn bounds(&self, i: u32) -> Packed;
+
+    /// What split `i` needs by the ring rule beside what its cuts do: splits of this chunk, of an earlier turn, or of earlier ones.
+    fn further(&self, _i: u32) -> &[u32] {
+        &[]
+    }
+}
+
+/// The bounds of the splits of a chunk.
+#[derive(Clone, Copy)]
+pub(crate) struct Own<'a> {
+    pub(crate) bounds: &'a [Packed],
+    /// By the ring rule the turn of each.
+    pub(crate) turns: Option<&'a [u32]>,
+}
+
+impl<'a> Own<'a> {
+    /// Those of all splits of a chunk.
+    pub(crate) fn of(bounds: &'a Bounds) -> Own<'a> {
+        let settled = bounds.guarantee() == Guarantee::Settled;
+        Own { bounds: &bounds.of, turns: settled.then_some(&bounds.turns) }
+    }
+
+    /// Those of a range of the splits of a mesh; `None` if there are none.
+    pub(super) fn within(bounds: &'a Bounds, range: Range<usize>) -> Option<Own<'a>> {
+        let all = Own::of(bounds);
+        let turns = match all.turns {
+            Some(t) => Some(t.get(range.clone())?),
+            None => None,
+        };
+        Some(Own { bounds: all.bounds.get(range)?, turns })
+    }
 }
 
 /// Of a mesh that is there as a whole.
@@ -98,6 +142,7 @@ pub(super) trait Source {
 pub(super) struct Whole<'a> {
     pub(super) tree: &'a Tree,
     pub(super) bounds: &'a Bounds,
+    pub(super) further: Option<&'a Further>,
 }
 
 impl Source for Whole<'_> {
@@ -112,6 +157,10 @@ impl Source for Whole<'_> {
     fn bounds(&self, i: u32) -> Packed {
         self.bounds.of.get(i as usize).copied().unwrap_or_default()
     }
+
+    fn further(&self, i: u32) -> &[u32] {
+        self.further.map_or(&[], |f| f.of(i))
+    }
 }
 
 /// The bounds of a split when they are written; anything when they are read.
@@ -125,7 +174,7 @@ fn code<C: Coder>(
     head: &MeshHead,
     first: u32,
     vertices: &[u32],
-    own: &[Packed],
+    own: Own<'_>,
     source: Option<&dyn Source>,
 ) -> Option<Links> {
     let (n0, count) = (head.base_vertices, vertices.len());
@@ -176,7 +225,7 @@ fn code<C: Coder>(
         made.push(n0 + 2 * i + 1);
     }
     let mut last = [end; 2];
-    for (k, &own) in own.iter().enumerate().take(count) {
+    for (k, &own) in own.bounds.iter().enumerate().take(count) {
         for (side, last) in last.iter_mut().enumerate() {
             if links.next[k][side] != NONE {
                 continue;
@@ -194,6 +243,10 @@ fn code<C: Coder>(
         }
     }
     links.outside.sort_unstable_by_key(|o| o.0);
+    if let Some(turns) = own.turns {
+        let needs = |i: u32| source.map_or(&[][..], |s| s.further(i));
+        links.further = further::code(c, (n0, first), &links.parent, turns, needs)?;
+    }
     // No split replaces two nodes.
     links.outside.windows(2).all(|w| w[0].0 < w[1].0).then_some(links)
 }
@@ -226,7 +279,7 @@ pub(super) fn write(
     head: &MeshHead,
     first: u32,
     vertices: &[u32],
-    own: &[Packed],
+    own: Own<'_>,
     source: &dyn Source,
 ) -> Option<(Vec<u8>, u64)> {
     let mut e = Encoder::default();
@@ -237,38 +290,43 @@ pub(super) fn write(
 }
 
 fn raw_bytes(links: &Links) -> u64 {
-    SPLIT * links.parent.len() as u64 + OUTSIDE * links.outside.len() as u64
+    let lists = LIST * links.further.len() as u64 + NEED * links.further.on.len() as u64;
+    SPLIT * links.parent.len() as u64 + OUTSIDE * links.outside.len() as u64 + lists
 }
 
 /// Reads the `PAGE` of splits whose vertices and bounds are given. `None`: damage.
 pub(crate) fn read(
     head: &MeshHead,
     first: u32,
-    (vertices, own): (&[u32], &[Packed]),
+    (vertices, own): (&[u32], Own<'_>),
     raw: u64,
     bytes: &[u8],
 ) -> Option<Links> {
-    if own.len() != vertices.len() {
+    if own.bounds.len() != vertices.len() || own.turns.is_some_and(|t| t.len() != vertices.len()) {
         return None;
     }
     let links = code(&mut Decoder::new(bytes)?, head, first, vertices, own, None)?;
     (raw_bytes(&links) == raw).then_some(links)
 }
 
-/// The `PAGE` of a base; bounds are about `origin`.
+/// The `PAGE` of a base; bounds are about `origin`, and for the ring rule if `settled`.
 pub(super) fn write_base(
     head: &MeshHead,
     (origin, diagonal): (DVec3, f64),
+    settled: bool,
     source: &dyn Source,
 ) -> Option<(Vec<u8>, u64)> {
     let mut out = Vec::new();
+    if settled {
+        out.push(Guarantee::Settled.code());
+    }
     for x in origin.to_array().into_iter().chain([diagonal]) {
         out.extend_from_slice(&x.to_le_bytes());
     }
     let mut e = Encoder::default();
     code_base(&mut e, head, &mut BaseLinks::default(), Some(source))?;
     e.finish(&mut out);
-    Some((out, raw_bytes_of_base(head)))
+    Some((out, raw_bytes_of_base(head) + u64::from(settled)))
 }
 
 fn raw_bytes_of_base(head: &MeshHead) -> u64 {
@@ -277,16 +335,22 @@ fn raw_bytes_of_base(head: &MeshHead) -> u64 {
 
 /// Reads the `PAGE` of a base. `None`: damage.
 pub(crate) fn read_base(head: &MeshHead, raw: u64, bytes: &[u8]) -> Option<BaseLinks> {
+    // A byte more says which rule bounds are for, if it is not that of cuts.
+    let settled = raw == raw_bytes_of_base(head) + 1;
+    let bytes = match bytes.split_first() {
+        Some((&kind, rest)) if settled => Some(rest).filter(|_| kind == Guarantee::Settled.code())?,
+        _ => bytes,
+    };
     let (numbers, stream) = bytes.split_at_checked(BASE as usize)?;
     let mut x = [0.0; 4];
     for (x, b) in x.iter_mut().zip(numbers.chunks_exact(8)) {
         *x = f64::from_le_bytes(b.try_into().ok()?);
     }
-    if raw != raw_bytes_of_base(head) || x.iter().any(|x| !x.is_finite()) || x[3] < 0.0 {
+    if raw != raw_bytes_of_base(head) + u64::from(settled) || x.iter().any(|x| !x.is_finite()) || x[3] < 0.0 {
         return None;
     }
     let mut links =
-        BaseLinks { origin: DVec3::new(x[0], x[1], x[2]), diagonal: x[3], ..BaseLinks::default() };
+        BaseLinks { origin: DVec3::new(x[0], x[1], x[2]), diagonal: x[3], settled, ..BaseLinks::default() };
     code_base(&mut Decoder::new(stream)?, head, &mut links, None)?;
     Some(links)
 }

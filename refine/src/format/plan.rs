@@ -8,6 +8,7 @@
 use super::places;
 use super::splits::{MOST_LEVEL, error_level};
 use crate::aif::NONE;
+use crate::hierarchy::Further;
 use crate::progressive::ProgressiveMesh;
 
 /// How splits are divided into bands and chunks.
@@ -138,8 +139,8 @@ fn forest(pm: &ProgressiveMesh, rank: &[u32], roots: &[u32]) -> Vec<Node> {
 }
 
 impl Plan {
-    /// `None` if the splits refer to what does not exist.
-    pub(super) fn new(pm: &ProgressiveMesh, layout: Layout) -> Option<Plan> {
+    /// With `further`, what the ring rule needs beside: no chunk needs a later one then, and bands are by the bounds' errors, in whose order that rule has the splits. `None` if the splits refer to what does not exist.
+    pub(super) fn new(pm: &ProgressiveMesh, layout: Layout, further: Option<&Further>) -> Option<Plan> {
         let n = pm.splits.len();
         let n0 = pm.base_vertices();
         if pm.splits.vertex.iter().zip(n0..).any(|(&v, count)| v as usize >= count) {
@@ -147,7 +148,7 @@ impl Plan {
         }
         let base = base_order(pm);
         let rank = ranks(pm, &base);
-        let bands = bands(pm, &rank, layout);
+        let bands = bands(pm, &rank, layout, further.is_some());
         // The vertex at the start of the band that each split descends from.
         let mut root = vec![NONE; pm.vertices()];
         for i in 0..n {
@@ -163,7 +164,7 @@ impl Plan {
         let keys = sorted(&sorted(&all, pm.vertices(), |i| nodes[i as usize].root as usize), last, |i| {
             bands[i as usize] as usize
         });
-        let mut schedule = Schedule { nodes, done: vec![false; n], order: Vec::with_capacity(n) };
+        let mut schedule = Schedule { nodes, further, done: vec![false; n], order: Vec::with_capacity(n) };
         let mut plan = Plan::default();
         for band in keys.chunk_by(|&a, &b| bands[a as usize] == bands[b as usize]) {
             let name = bands[band[0] as usize];
@@ -212,7 +213,7 @@ fn sorted(numbers: &[u32], keys: usize, key: impl Fn(u32) -> usize) -> Vec<u32> 
 }
 
 /// The band of every split: the method's levels where it has any, else by count, in the order of their errors.
-fn bands(pm: &ProgressiveMesh, rank: &[u32], layout: Layout) -> Vec<u32> {
+fn bands(pm: &ProgressiveMesh, rank: &[u32], layout: Layout, by_bounds: bool) -> Vec<u32> {
     let n = pm.splits.len();
     if pm.levels.len() > 2 {
         let mut band = 0;
@@ -226,7 +227,9 @@ fn bands(pm: &ProgressiveMesh, rank: &[u32], layout: Layout) -> Vec<u32> {
             .collect();
     }
     // Coarse to fine.
-    let level = |i: u32| error_level(pm.splits.error[i as usize]) as usize;
+    let bounds = pm.bounds.as_deref().filter(|_| by_bounds);
+    let error = |i: usize| bounds.map_or(pm.splits.error[i], |b| b.error(i) as f32);
+    let level = |i: u32| error_level(error(i as usize)) as usize;
     let all: Vec<u32> = (0..n as u32).collect();
     let order = sorted(&all, MOST_LEVEL as usize + 1, |i| (MOST_LEVEL as usize).saturating_sub(level(i)));
     let (first, rest) = order.split_at(layout.first(n).min(n));
@@ -355,14 +358,15 @@ pub(super) fn labels(base: &[u32]) -> Vec<Label> {
 }
 
 /// Makes the order, chunk by chunk.
-struct Schedule {
+struct Schedule<'a> {
     nodes: Vec<Node>,
+    further: Option<&'a Further>,
     /// The splits that are in the order.
     done: Vec<bool>,
     order: Vec<u32>,
 }
 
-impl Schedule {
+impl Schedule<'_> {
     /// True if split `i` is in a chunk.
     fn has(&self, i: u32) -> bool {
         self.nodes[i as usize].chunk != NONE
@@ -383,7 +387,8 @@ impl Schedule {
         taken.push(i);
         while let Some(&i) = taken.get(at) {
             at += 1;
-            for d in self.nodes[i as usize].on {
+            let (on, further) = (self.nodes[i as usize].on, self.further.map_or(&[][..], |f| f.of(i)));
+            for &d in on.iter().chain(further) {
                 if let Some(node) = self.nodes.get_mut(d as usize).filter(|node| node.chunk == NONE) {
                     node.chunk = number;
                     taken.push(d);

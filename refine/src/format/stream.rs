@@ -107,7 +107,7 @@ impl Tree {
         first[0].chunk.count = head.base_vertices;
         let bounds = path.vertices.iter().map(|v| (v.next.split, v.next.bounds)).collect();
         let links = AtBase { of: &path.vertices, bounds };
-        let (bytes, raw) = pages::write_base(&head, self.about, &links)?;
+        let (bytes, raw) = pages::write_base(&head, self.about, false, &links)?;
         let mut page = part(ChunkType::PAGE, false, 0, raw, bytes);
         (page.chunk.count, page.chunk.first_face) = (head.base_vertices, head.base_wedges);
         first.push(page);

@@ -9,7 +9,7 @@ use super::lattice;
 use super::pages;
 use super::plan::{Layout, Piece, Plan};
 use super::splits::{self, Counts};
-use crate::hierarchy::{Bounds, Guarantee, Tree};
+use crate::hierarchy::{Bounds, Further, Guarantee, Tree};
 use crate::progressive::{Damage, ProgressiveMesh, RowsOf};
 use std::sync::Arc;
 
@@ -23,8 +23,8 @@ pub struct EncodeOptions {
     pub quantize: Option<u32>,
     /// Chunks follow each other: none can be read before all that stand before it. Files are smaller.
     pub sequential: bool,
-    /// Beside every chunk, what refining out of core takes ([`crate::paged`]): links of the vertex hierarchy. Only without [`EncodeOptions::sequential`], of meshes with bounds by the rule of cuts
-    /// ([`ProgressiveMesh::bounds`]).
+    /// Beside every chunk, what refining out of core takes ([`crate::paged`]): links of the vertex hierarchy. Only without [`EncodeOptions::sequential`], of meshes with bounds
+    /// ([`ProgressiveMesh::bounds`]). Where those are by the ring rule, the splits come by their errors, and what that rule needs goes along.
     pub pages: bool,
     /// Splits of a chunk, at most but for those of a single vertex and the few that others need; by default 16,384, and 8,192 of chunks that follow each other. With smaller ones less has to be fetched for a region,
     /// and more in all.
@@ -93,10 +93,8 @@ pub enum EncodeError {
     /// A mesh's parts do not go together in a way that [`Damage`] has no word for.
     #[error("mesh {0}: its arrays contradict each other")]
     Inconsistent(usize),
-    /// Pages are wanted of a mesh without bounds, or with bounds by the ring rule.
-    #[error(
-        "mesh {0}: it has no bounds by the rule of cuts, which refining out of core takes; measure them first"
-    )]
+    /// Pages are wanted of a mesh without bounds.
+    #[error("mesh {0}: it has no bounds, which refining out of core takes; measure them first")]
     NoBounds(usize),
     /// Bounds of a mesh whose extent no number holds.
     #[error(
@@ -174,8 +172,7 @@ pub fn encode(
         if pm.bounds.as_ref().is_some_and(|b| !b.extent().1.is_finite()) {
             return Err(EncodeError::Extent(m));
         }
-        let settled = |b: &Arc<Bounds>| b.guarantee() == Guarantee::Settled;
-        if options.pages && !options.sequential && pm.bounds.as_ref().is_none_or(settled) {
+        if options.pages && !options.sequential && pm.bounds.is_none() {
             return Err(EncodeError::NoBounds(m));
         }
         let places: Vec<u32> =
@@ -248,7 +245,14 @@ fn encode_mesh(
     let layout =
         if options.sequential { Layout::sequential(options.chunk) } else { Layout::alone(options.chunk) };
     let ordered = source.order.is_some() && !options.any_order;
-    let plan = Plan::new(source, if ordered { layout.before_order() } else { layout })?;
+    let settled = source.bounds.as_deref().filter(|b| options.pages && b.guarantee() == Guarantee::Settled);
+    let further = match settled.filter(|_| !options.sequential) {
+        Some(bounds) => Some(Further::new(source, bounds).ok()?),
+        None => None,
+    };
+    let layout = if ordered { layout.before_order() } else { layout };
+    let plan = Plan::new(source, layout, further.as_ref())?;
+    let further = further.map(|f| f.reordered(&plan.order));
     let mut pm = source.reordered(&plan.order).ok()?;
     if options.any_order {
         input_order::sort_base(&mut pm);
@@ -331,7 +335,8 @@ fn encode_mesh(
     let paged = paged.map(|b| (b, Tree::new(&pm)));
     let page = match &paged {
         Some((bounds, tree)) => {
-            let (bytes, raw) = pages::write_base(&head, bounds.extent(), &pages::Whole { tree, bounds })?;
+            let links = pages::Whole { tree, bounds, further: further.as_ref() };
+            let (bytes, raw) = pages::write_base(&head, bounds.extent(), further.is_some(), &links)?;
             let mut page = part(ChunkType::PAGE, false, m, raw, bytes);
             (page.chunk.count, page.chunk.first_face) = (head.base_vertices, head.base_wedges);
             Some(page)
@@ -348,8 +353,9 @@ fn encode_mesh(
             Some((bounds, tree)) => {
                 let Chunk { first, count, band, subtree, error, .. } = p.chunk;
                 let vertices = &pm.splits.vertex[at.split..at.split + count as usize];
-                let own = bounds.of.get(at.split..at.split + count as usize)?;
-                let (bytes, raw) = pages::write(&head, first, vertices, own, &pages::Whole { tree, bounds })?;
+                let own = pages::Own::within(bounds, at.split..at.split + count as usize)?;
+                let links = pages::Whole { tree, bounds, further: further.as_ref() };
+                let (bytes, raw) = pages::write(&head, first, vertices, own, &links)?;
                 let mut page = part(ChunkType::PAGE, false, m, raw, bytes);
                 page.chunk = Chunk { first, count, band, subtree, error, ..page.chunk };
                 page.chunk.first_face = at.wedge as u32;
@@ -378,7 +384,7 @@ pub(super) fn bounds_beside(splits: &Part, bounds: &Bounds, range: std::ops::Ran
         ChunkType::BOUNDS,
         false,
         splits.chunk.mesh,
-        bounds::raw_bytes(bounds.guarantee(), range.len()),
+        bounds::raw_bytes(bounds.guarantee(), bounds.is_directed(), range.len()),
         bytes,
     );
     p.turn = splits.turn;

@@ -197,6 +197,11 @@ impl Bounds {
         !self.directions.is_empty() || self.of.is_empty()
     }
 
+    /// The same, and there are some.
+    pub(crate) fn is_directed(&self) -> bool {
+        !self.directions.is_empty()
+    }
+
     /// Splits.
     pub fn len(&self) -> usize {
         self.of.len()

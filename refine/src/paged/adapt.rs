@@ -212,10 +212,9 @@ impl<S: ByteRanges> PagedView<S> {
             if self.shelf.last_place(i) == NONE {
                 continue;
             }
-            let needs = self.undo(i)?;
+            self.undo(i, freed)?;
             frame.meter.done.collapses += 1;
             frame.meter.since += 1;
-            freed.extend(needs.into_iter().filter(|&d| d != NONE && self.is_free(d)));
         }
         Ok(())
     }
@@ -394,8 +393,11 @@ impl<S: ByteRanges> PagedView<S> {
         closure.clear();
         let gathered = self.gather(i, &mut closure, frame);
         closure.iter().for_each(|&j| self.shelf.mark(j, false));
-        // What a split depends on was made before it.
-        closure.sort_unstable();
+        // What a split depends on comes before it.
+        match self.shelf.by_rings() {
+            true => closure.sort_unstable_by_key(|&j| self.shelf.order_key(j)),
+            false => closure.sort_unstable(),
+        }
         closure.dedup();
         let applied = gathered.and_then(|g| match g {
             Gathered::Whole => self.apply_all(&closure, i, frame),
@@ -482,7 +484,14 @@ impl<S: ByteRanges> PagedView<S> {
             }
             self.shelf.mark(j, true);
             let needs = self.shelf.needs(j).ok_or(Damage::Fan(j as usize))?;
-            for d in needs.into_iter().filter(|&d| d != NONE) {
+            for n in 0..needs.len() + self.shelf.further(j).len() {
+                let d = match needs.get(n) {
+                    Some(&d) => d,
+                    None => self.shelf.further(j)[n - needs.len()],
+                };
+                if d == NONE {
+                    continue;
+                }
                 if self.shelf.is_led(d) || self.shelf.is_marked(d) {
                     continue;
                 }
@@ -515,14 +524,17 @@ impl<S: ByteRanges> PagedView<S> {
         for d in needs.into_iter().filter(|&d| d != NONE) {
             self.hold_split(d);
         }
+        for k in 0..self.shelf.further(i).len() {
+            self.hold_split(self.shelf.further(i)[k]);
+        }
         self.free_split(i)?;
         let old = self.shelf.head.base_vertices + 2 * i;
         self.offer(old)?;
         self.offer(old + 1)
     }
 
-    /// No longer asks for split `i`, on which nothing that is depends; returns what it depended on.
-    fn undo(&mut self, i: u32) -> Result<[u32; 3], PagedError> {
+    /// No longer asks for split `i`, on which nothing that is depends; appends to `freed` what can be undone then.
+    fn undo(&mut self, i: u32, freed: &mut Vec<u32>) -> Result<(), PagedError> {
         let needs = self.shelf.needs(i).ok_or(Damage::Fan(i as usize))?;
         let (node, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
         let old = self.shelf.head.base_vertices + 2 * i;
@@ -536,11 +548,11 @@ impl<S: ByteRanges> PagedView<S> {
         }
         self.lead(i, needs, false);
         self.offer(node)?;
-        for d in needs {
-            if d != NONE && self.is_free(d) {
-                self.free_split(d)?;
-            }
+        let from = freed.len();
+        freed.extend(needs.iter().chain(self.shelf.further(i)).filter(|&&d| d != NONE && self.is_free(d)));
+        for &d in &freed[from..] {
+            self.free_split(d)?;
         }
-        Ok(needs)
+        Ok(())
     }
 }

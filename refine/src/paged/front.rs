@@ -1,6 +1,7 @@
 //! A split and its undoing on the faces shown, with what stands in pages.
 
 use super::page::{APPLIED, LED, Record, RowRef};
+use super::shelf::Shelf;
 use super::{PagedError, PagedView};
 use crate::aif::NONE;
 use crate::format::ByteRanges;
@@ -69,32 +70,40 @@ impl<S: ByteRanges> PagedView<S> {
         }
         if self.motions.is_some() {
             self.pending -= usize::from(self.shelf.is_led(i));
-            self.count(needs, |r| &mut r.holders, 1);
+            self.count(i, needs, |r| &mut r.holders, 1);
         }
         Ok(())
     }
 
     /// What split `i` depends on can have one more that depends on it. Honest meshes have few: what a hostile file says of more is damage.
-    pub(super) fn can_count(&self, i: u32, of: impl Fn(&Record) -> u8) -> Result<[u32; 3], Damage> {
+    pub(super) fn can_count(&self, i: u32, of: impl Fn(&Record) -> u16) -> Result<[u32; 3], Damage> {
         let needs = self.shelf.needs(i).ok_or(Damage::Fan(i as usize))?;
-        let full = |d: u32| self.shelf.record(d).is_none_or(|r| of(r) > u8::MAX - 3);
-        match needs.into_iter().any(|d| d != NONE && full(d)) {
+        let further = self.shelf.further(i);
+        // It may be listed so often.
+        let times = needs.len() + further.len();
+        let full = |d: u32| self.shelf.record(d).is_none_or(|r| of(r) as usize + times > u16::MAX.into());
+        match needs.iter().any(|&d| d != NONE && full(d)) || further.iter().any(|&d| full(d)) {
             true => Err(Damage::Fan(i as usize)),
             false => Ok(needs),
         }
     }
 
-    /// Adds `by` to what is counted of these splits.
-    fn count(&mut self, splits: [u32; 3], of: impl Fn(&mut Record) -> &mut u8, by: i8) {
-        for d in splits.into_iter().filter(|&d| d != NONE) {
-            if let Some(r) = self.shelf.record_mut(d) {
+    /// Adds `by` to what is counted of what split `i` depends on: `needs` of its vertex and cuts.
+    fn count(&mut self, i: u32, needs: [u32; 3], of: impl Fn(&mut Record) -> &mut u16, by: i16) {
+        let add = |shelf: &mut Shelf<S>, d: u32| {
+            if let Some(r) = shelf.record_mut(d) {
                 let n = of(r);
                 *n = n.wrapping_add_signed(by);
             }
+        };
+        needs.into_iter().filter(|&d| d != NONE).for_each(|d| add(&mut self.shelf, d));
+        for k in 0..self.shelf.further(i).len() {
+            let d = self.shelf.further(i)[k];
+            add(&mut self.shelf, d);
         }
     }
 
-    /// Split `i`, which depends on `needs`, is asked for now, or no longer. Those can have one more that depends on them.
+    /// Split `i`, which depends on `needs` by its vertex and cuts, is asked for now, or no longer. What it depends on can have one more that does.
     pub(super) fn lead(&mut self, i: u32, needs: [u32; 3], on: bool) {
         let (clock, timed) = (self.shelf.clock, self.motions.is_some());
         let mut drawn = true;
@@ -108,7 +117,7 @@ impl<S: ByteRanges> PagedView<S> {
                 p.stamp = clock;
             }
         }
-        self.count(needs, |r| &mut r.dependents, if on { 1 } else { -1 });
+        self.count(i, needs, |r| &mut r.dependents, if on { 1 } else { -1 });
         let pending = usize::from(timed && !drawn);
         if on {
             self.led += 1;
@@ -143,7 +152,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         if self.motions.is_some() {
             let needs = self.shelf.needs(i).unwrap_or([NONE; 3]);
-            self.count(needs, |r| &mut r.holders, -1);
+            self.count(i, needs, |r| &mut r.holders, -1);
         }
         Ok(())
     }

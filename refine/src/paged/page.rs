@@ -1,7 +1,7 @@
 //! Chunks of splits as they are held, and the base.
 
 use crate::aif::{NONE, Positions};
-use crate::format::pages::{self, BaseLinks, Links};
+use crate::format::pages::{self, BaseLinks, Links, Lists};
 use crate::format::{MeshHead, SplitBlock};
 use crate::hierarchy::{Packed, SplitRows};
 use crate::progressive::{ProgressiveMesh, SplitCode, SplitKind};
@@ -97,9 +97,9 @@ pub(super) struct Record {
     pub(super) code: SplitCode,
     pub(super) flags: u8,
     /// Splits asked for that depend on it.
-    pub(super) dependents: u8,
+    pub(super) dependents: u16,
     /// With geomorphs by time: applied splits that do.
-    pub(super) holders: u8,
+    pub(super) holders: u16,
 }
 
 /// A chunk of splits, with what is applied of it.
@@ -118,6 +118,8 @@ pub(super) struct Page {
     moved_before: Vec<u32>,
     /// Splits of later chunks that replace nodes made here, ascending, and their bounds.
     pub(super) outside: Vec<(u32, Packed)>,
+    /// By the ring rule what splits depend on beside what makes their vertex and their cuts, and their turns.
+    pub(super) further: Lists,
     pub(super) rows: Vec<f32>,
     pub(super) present: Vec<u64>,
     pub(super) explicit: Vec<u32>,
@@ -224,6 +226,7 @@ impl Page {
             moved_positions: fit(block.moved_positions),
             moved_before,
             outside: shrink(links.outside),
+            further: links.further,
             rows: shrink(block.rows),
             present: shrink(block.present),
             explicit: shrink(block.explicit),
@@ -305,6 +308,9 @@ impl Page {
             + points(&self.moved_positions)
             + of(&self.moved_before)
             + of(&self.outside)
+            + of(&self.further.starts)
+            + of(&self.further.on)
+            + of(&self.further.turns)
             + of(&self.rows)
             + of(&self.present)
             + of(&self.explicit)

@@ -8,7 +8,7 @@ use crate::format::{
     ByteRanges, CONTRADICTS, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, Room, pages,
     read_piece, read_piece_within,
 };
-use crate::hierarchy::Packed;
+use crate::hierarchy::{Guarantee, Packed};
 use crate::progressive::{Damage, Fans, link_faces};
 use glam::{DVec3, Vec3};
 use std::borrow::Cow;
@@ -79,13 +79,15 @@ pub(super) struct OnWay {
     bounds: Chunk,
     beside: Chunk,
     room: Room,
+    /// Its bounds are for the ring rule.
+    settled: bool,
 }
 
 /// Fetches and decodes a page.
 ///
 /// Errors: damage, which too little room cannot be told from; the source's.
 pub(super) fn read_page(source: &(impl ByteRanges + ?Sized), head: &MeshHead, way: &OnWay) -> Made {
-    let OnWay { chunk, bounds, beside, room } = way;
+    let OnWay { chunk, bounds, beside, room, settled } = way;
     // One range: they stand side by side.
     let bytes = source.fetch(chunk.offset..beside.range().end).map_err(FormatError::from)?;
     let part = |c: &Chunk| {
@@ -97,18 +99,21 @@ pub(super) fn read_page(source: &(impl ByteRanges + ?Sized), head: &MeshHead, wa
         _ => return Err(chunk.damage("it is no chunk of splits").into()),
     };
     let own = match read_piece(bounds, None, part(bounds))? {
-        Piece::Bounds(own) => own.of,
+        Piece::Bounds(own) if (own.guarantee() == Guarantee::Settled) == *settled => own,
+        Piece::Bounds(_) => {
+            return Err(bounds.damage("its bounds are for another rule than the mesh's").into());
+        }
         _ => return Err(bounds.damage("it holds no bounds").into()),
     };
     beside.check(part(beside))?;
     let damaged = |c: &Chunk| c.damage(CONTRADICTS);
-    let known = (&block.splits.vertex[..], &own[..]);
+    let known = (&block.splits.vertex[..], pages::Own::of(&own));
     let links =
         pages::read(head, chunk.first, known, beside.raw, part(beside)).ok_or_else(|| damaged(beside))?;
     if head.channels.is_some() && block.first_wedge != beside.first_face {
         return Err(damaged(beside).into());
     }
-    let page = Page::new(head, *block, own, links).ok_or_else(|| damaged(chunk))?;
+    let page = Page::new(head, *block, own.of, links).ok_or_else(|| damaged(chunk))?;
     Ok((page, bytes.len() as u64))
 }
 
@@ -116,12 +121,14 @@ pub(super) fn read_page(source: &(impl ByteRanges + ?Sized), head: &MeshHead, wa
 const STRIDE: usize = 1024;
 
 /// Bytes that decoding a chunk of splits with its `BNDS` and its `PAGE`, the last, takes at most on the way, besides the page that comes of it: what is fetched, and what the decoders hold.
-fn on_the_way(head: &MeshHead, [c, page]: [&Chunk; 2], room: Room) -> usize {
+fn on_the_way(head: &MeshHead, [c, page]: [&Chunk; 2], room: Room, settled: bool) -> usize {
     let fetched = page.range().end.saturating_sub(c.offset);
     // One after the other, but what was read first is there.
     // And until the page is put together, what it is put together from is there.
-    let parts = (18 + 24 + pages::SPLIT + size_of::<Packed>() as u64) * c.count as u64;
-    let beside = pages::scratch(c.count, page.raw).max(parts);
+    // Turns, and which way deviations lie.
+    let more = 6 * u64::from(settled);
+    let parts = (18 + 24 + pages::SPLIT + size_of::<Packed>() as u64 + more) * c.count as u64;
+    let beside = pages::scratch(c.count, page.raw, settled).max(parts);
     let all = fetched.saturating_add(room.bytes(head, c)).saturating_add(beside);
     usize::try_from(all).unwrap_or(usize::MAX / 4)
 }
@@ -196,7 +203,7 @@ impl<S: ByteRanges> Shelf<S> {
                     .ok_or_else(|| p.damage("its wedges do not follow those before"))?,
             };
             moves |= c.raw != c.count as u64 * (18 + point);
-            scratch = scratch.max(on_the_way(&head, [&c, &p], Room::usual(c.count)));
+            scratch = scratch.max(on_the_way(&head, [&c, &p], Room::usual(c.count), links.settled));
             while index.len() * STRIDE < (c.first + c.count) as usize {
                 index.push(k as u32);
             }
@@ -412,14 +419,15 @@ impl<S: ByteRanges> Shelf<S> {
     /// What decoding the chunk of split `i` takes on the way beyond [`Shelf::most_at_once`], if it takes all that the format allows.
     pub(super) fn most_beyond(&self, i: u32) -> Result<usize, PagedError> {
         let [chunk, _, beside] = self.entries(i)?;
-        Ok(on_the_way(&self.head, [&chunk, &beside], Room::ANY).saturating_sub(self.scratch))
+        let all = on_the_way(&self.head, [&chunk, &beside], Room::ANY, self.by_rings());
+        Ok(all.saturating_sub(self.scratch))
     }
 
     /// What the page of split `i` is made of.
     fn way(&self, i: u32, all: bool) -> Result<OnWay, PagedError> {
         let [chunk, bounds, beside] = self.entries(i)?;
         let room = if all { Room::ANY } else { Room::usual(chunk.count) };
-        Ok(OnWay { chunk, bounds, beside, room })
+        Ok(OnWay { chunk, bounds, beside, room, settled: self.by_rings() })
     }
 
     /// Fetches and decodes the page of split `i`, taking on the way as much as [`Shelf::most_at_once`] says; `all`: whatever it takes ([`Shelf::most_beyond`]). Pages that were made ahead are taken as they are.
@@ -501,13 +509,39 @@ impl<S: ByteRanges> Shelf<S> {
         self.record(i).map(|r| (r.parent, r.vertex))
     }
 
-    /// What split `i` depends on; [`NONE`] for the base.
+    /// Splits depend on more than what makes their vertices and their cuts: bounds are for the ring rule.
+    #[inline]
+    pub(super) fn by_rings(&self) -> bool {
+        self.base.links.settled
+    }
+
+    /// What split `i` depends on beside [`Shelf::needs`].
+    #[inline]
+    pub(super) fn further(&self, i: u32) -> &[u32] {
+        match self.by_rings() {
+            true => self.page(i).map_or(&[], |(p, k)| p.further.of(k)),
+            false => &[],
+        }
+    }
+
+    /// By what splits whose pages are there come in an order in which each has what it depends on before it. By the ring rule chunks follow each other, within one turns tell.
+    pub(super) fn order_key(&self, i: u32) -> (usize, u32, u32) {
+        match self.by_rings() {
+            true => {
+                let turn = self.page(i).and_then(|(p, k)| p.further.turns.get(k).copied());
+                (self.chunk_of(i), turn.unwrap_or(0), i)
+            }
+            false => (0, 0, i),
+        }
+    }
+
+    /// What split `i` depends on by its vertex and its cuts; [`NONE`] for the base.
     #[inline]
     pub(super) fn needs(&self, i: u32) -> Option<[u32; 3]> {
         self.record(i).map(|r| self.needs_of(r))
     }
 
-    /// What a split depends on.
+    /// The same of a split that is at hand.
     #[inline]
     pub(super) fn needs_of(&self, r: &Record) -> [u32; 3] {
         [self.maker(r.parent), self.half_of_cut(r.left).0, self.half_of_cut(r.right).0]

@@ -132,14 +132,18 @@ impl<S: ByteRanges> PagedView<S> {
 }
 
 impl<S> Shelf<S> {
-    /// The splits of resident pages of which `of` is true, ascending. `pages`: of those only.
+    /// The splits of resident pages of which `of` is true, each behind what it depends on. `pages`: of those only.
     fn splits_where(&self, pages: impl Fn(&Page) -> bool, of: impl Fn(u8) -> bool) -> Vec<u32>
     where
         S: ByteRanges,
     {
         let mut out = Vec::new();
         for p in self.all().filter(|p| pages(p)) {
+            let from = out.len();
             out.extend((p.first..).zip(&p.of).filter(|(_, r)| of(r.flags)).map(|(i, _)| i));
+            if self.by_rings() {
+                out[from..].sort_unstable_by_key(|&i| self.order_key(i));
+            }
         }
         out
     }

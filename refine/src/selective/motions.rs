@@ -15,9 +15,9 @@ pub(crate) trait Stage: Cut {
     type Error;
     /// Split `i` is asked for.
     fn is_led(&self, i: u32) -> bool;
-    /// The splits that have begun or ceased to be led since the last step, ascending.
+    /// The splits that have begun or ceased to be led since the last step, each behind what it needs.
     fn changed(&self) -> Vec<u32>;
-    /// The splits that linger, ascending.
+    /// The splits that linger, each behind what it needs.
     fn lingering(&self) -> Vec<u32>;
     /// Nothing drawn depends on split `i`, which is drawn, and nothing of it is on the way but vertices.
     fn is_free(&self, i: u32) -> bool;
@@ -122,7 +122,7 @@ impl Motions {
     pub(crate) fn follow<S: Stage>(&mut self, stage: &mut S, lenses: &[Lens]) -> Result<Followed, S::Error> {
         let mut done = Followed::default();
         let (changed, frames) = (stage.changed(), self.frames);
-        // Closed sets: ascending, all that a split needs comes before it.
+        // Closed sets: all that a split needs comes before it.
         for &i in &changed {
             if !stage.is_led(i) || stage.is_applied(i) {
                 continue;

@@ -5,6 +5,7 @@ use glam::DVec3;
 use progmesh_meshes::{GenerateOptions, Sample, generate};
 use progmesh_refine::ProgressiveMesh;
 use progmesh_refine::aif::*;
+use progmesh_refine::format::Chunk;
 use progmesh_refine::hierarchy::Hierarchy;
 use progmesh_refine::progressive::{build, same_positions};
 use progmesh_refine::selective::Lens;
@@ -141,4 +142,21 @@ pub fn least_closed<D: Iterator<Item = usize>>(
         }
     }
     want
+}
+
+/// Sets the checksums of a chunk, and of head and directory, right.
+pub fn sign(bytes: &mut [u8], c: &Chunk) {
+    let sum = crc32fast::hash(&bytes[c.range().start as usize..c.range().end as usize]);
+    let entry = 48 + 64 * c.index as usize;
+    bytes[entry + 36..entry + 40].copy_from_slice(&sum.to_le_bytes());
+    sign_directory(bytes);
+}
+
+/// The same of head and directory.
+pub fn sign_directory(bytes: &mut [u8]) {
+    let end = 48 + 64 * u32::from_le_bytes(bytes[24..28].try_into().unwrap()) as usize;
+    let mut h = crc32fast::Hasher::new();
+    h.update(&bytes[..44]);
+    h.update(&bytes[48..end]);
+    bytes[44..48].copy_from_slice(&h.finalize().to_le_bytes());
 }

@@ -22,6 +22,7 @@ impl Args {
         let interrupt = Interrupt::watch();
         let report = common::in_pool(self.making.collapsing.threads, || {
             let mut scene = paging::open(&self.input, mib, 0)?;
+            let rule = self.needs.rule.name_of_paged(&scene, &file)?;
             let (read, refining) = (start.elapsed().as_secs_f64(), Instant::now());
             let most = self.needs.budget_faces;
             let tau =
@@ -38,7 +39,7 @@ impl Args {
             Ok(Report {
                 command: "extract",
                 to: results.format.extension(),
-                rule: "cuts",
+                rule,
                 error: "uniform",
                 tau: tau.is_finite().then_some(tau),
                 faces: scene.face_count(),

@@ -35,6 +35,7 @@ impl Args {
         let start = Instant::now();
         let beside = if self.path.has_grid() { paging::grid_cache(mib) } else { 0 };
         let mut scene = paging::open(&self.input, mib, beside)?;
+        let rule = self.needs.rule.name_of_paged(&scene, &file)?;
         let read = start.elapsed().as_secs_f64();
         let course = self.path.lay(source, scene.bounds(), (&file, self.terrain()))?;
         if let Some(g) = course.ground.as_ref().filter(|_| self.terrain().is_some()) {
@@ -53,7 +54,7 @@ impl Args {
         let short = frames.iter().filter(|f| f.no_room.is_some_and(|n| n > 0)).count();
         let path = self.path.name().to_string();
         let mut report = Report::new(path, self.needs.tau, scene.full_faces(), frames, memory, [read, 0.0]);
-        report.paging = Some(paging);
+        (report.rule, report.paging) = (rule, Some(paging));
         if self.measure_every.is_some() && course.ground.is_none() {
             report.warnings.push(format!(
                 "{file}: to measure, all of the mesh was in memory before the flight, beyond --memory; while it is flown only the samples are"

@@ -254,7 +254,8 @@ impl Path<'_> {
             let own = at..at + count as usize;
             let local = &self.mesh.splits.vertex[start + own.start..start + own.end];
             let vertices: Vec<u32> = local.iter().map(|&v| self.in_file(v, &open)).collect();
-            let (bytes, raw) = pages::write(&self.tree.head, first, &vertices, &open.packed[own], &links)?;
+            let own = pages::Own { bounds: &open.packed[own], turns: None };
+            let (bytes, raw) = pages::write(&self.tree.head, first, &vertices, own, &links)?;
             let mut page = part(ChunkType::PAGE, false, 0, raw, bytes);
             page.chunk = Chunk { first, count, band, error, ..page.chunk };
             page.chunk.first_face = self.head.base_wedges;
