@@ -27,6 +27,20 @@ pub struct Judgement {
     pub mean_pixels: f64,
 }
 
+/// Sorts faces, however they came and whichever corner first: so that samples of a mesh are the same in memory, where the rule of rings has the faces in an order of its own, and of its file.
+fn in_order(faces: &mut [[DVec3; 3]]) {
+    let places = |a: &DVec3, b: &DVec3| {
+        a.x.total_cmp(&b.x).then_with(|| a.y.total_cmp(&b.y)).then_with(|| a.z.total_cmp(&b.z))
+    };
+    for t in faces.iter_mut() {
+        let least = (1..3).fold(0, |least, k| if places(&t[k], &t[least]).is_lt() { k } else { least });
+        t.rotate_left(least);
+    }
+    faces.sort_unstable_by(|a, b| {
+        places(&a[0], &b[0]).then_with(|| places(&a[1], &b[1])).then_with(|| places(&a[2], &b[2]))
+    });
+}
+
 impl Judge {
     /// `count` samples of the finest surface, the same every time: places of a sequence of low discrepancy, by area. Deviations count as the scene lets them ([`SelectiveScene::set_deviation`]).
     ///
@@ -59,6 +73,7 @@ impl Judge {
                 faces.extend(full.indices().iter().map(|[a, b, c]| [at(a), at(b), at(c)]));
             }
         }
+        in_order(&mut faces);
         let normal = |t: &[DVec3; 3]| (t[1] - t[0]).cross(t[2] - t[0]);
         let mut sum = 0.0;
         let areas: Vec<f64> = faces
