@@ -425,6 +425,31 @@ fn a_hole_alone_is_all_but_the_hole() {
 }
 
 #[test]
+fn what_a_line_only_touches_is_on_the_other_side() {
+    for k in 0..60 {
+        let y = 0.1 * k as f64;
+        let strip = |low: f64, high: f64| {
+            [[-1e3, low], [1e3, low], [1e3, high], [-1e3, high]].map(|[x, y]| DVec3::new(x, y, 1.0))
+        };
+        let turned = |mut cycle: [DVec3; 4]| {
+            cycle.reverse();
+            cycle
+        };
+        // Below is positive. An edge of what is above lies along the line, exactly.
+        let (line, above, below) = (DVec3::new(0.0, -1.0, y), strip(y, y + 1.0), strip(y - 3.0, y - 2.0));
+        assert!(Polygon::new([above]).clip(line).is_empty(), "{y}");
+        assert_eq!(Polygon::new([above, below]).clip(line), Polygon::new([below]), "{y}");
+        // As holes in everything: the line bounds what is left.
+        let along = |c: &[DVec3]| c.iter().all(|p| line.dot(*p).abs() < 1e-12);
+        for (holes, left) in [(vec![turned(above)], 1), (vec![turned(above), turned(below)], 2)] {
+            let clipped = Polygon::new(holes).clip(line);
+            assert_eq!(clipped.cycles().len(), left, "{y}");
+            assert_eq!(clipped.cycles().filter(|c| along(c)).count(), 1, "{y}");
+        }
+    }
+}
+
+#[test]
 fn a_polygon_is_cut_where_it_stands_in_space() {
     let ring = |r: f64, way: f64| {
         (0..4)
