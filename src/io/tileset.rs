@@ -116,7 +116,10 @@ mod tests {
         assert_eq!((&made["geometricError"], &root["geometricError"]), (&json!(18.0), &json!(9.0)));
         // Larger ones are as wrong as they are wide where none is shown.
         tiles.get_mut(&(1, [1, 1])).unwrap().bounds[1] = [300.0, 2.0, 400.0];
-        assert_eq!(tileset(&tiles, None, Map::new())["geometricError"], json!(300f64.hypot(2.0).hypot(400.0)));
+        assert_eq!(
+            tileset(&tiles, None, Map::new())["geometricError"],
+            json!(300f64.hypot(2.0).hypot(400.0))
+        );
         tiles.get_mut(&(1, [1, 1])).unwrap().bounds[1] = [6.0, 2.0, 4.0];
         assert_eq!(root["boundingVolume"]["box"][0], json!(3.0));
         assert_eq!(root["boundingVolume"]["box"][1], json!(-2.0));
