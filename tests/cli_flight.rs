@@ -235,6 +235,7 @@ fn a_terrain_is_measured_against_its_grid() {
     p.run("fly scan.ply --path circle --grid grid.tif").failed(3, "is not where a mesh of grid.tif stands");
     p.run("fly scan.ply --path circle --grid none.tif").failed(3, "none.tif");
     p.run("fly scan.ply --path circle --path-speed fast").failed(2, "--grid");
+    p.run("fly scan.ply --path cirlce").failed(3, "--path takes circle, lemniscate or a file");
     p.run("fly scan.ply --path circle --grid grid.tif --path-speed 0").failed(2, "slow, fast");
 }
 

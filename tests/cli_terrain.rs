@@ -82,6 +82,12 @@ fn bad_grids_are_refused_by_name() {
     p.run("terrain info none.tif").failed(3, "none.tif");
     p.write("a.tif", "II*\0\x10\0\0\0");
     p.run("terrain info a.tif").failed(3, "a.tif: directory: the file ends before");
+    p.write("words.tif", "hello\n");
+    p.run("terrain info words.tif")
+        .failed(3, "words.tif: its name says TIFF, and it does not begin like one");
+    p.run("terrain info words.tif --from png").failed(3, "words.tif");
+    p.write("empty.tif", "");
+    p.run("terrain info empty.tif").failed(3, "empty.tif: the file is empty");
     p.done("generate terrain b.tif --size 300 -q");
     let whole = p.read("b.tif");
     p.write("b.tif", &whole[..whole.len() - 1]);

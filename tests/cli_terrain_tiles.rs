@@ -162,6 +162,8 @@ fn a_tileset_is_a_tree_of_boxes_that_hold_their_tiles() {
     assert_eq!((&report["space"], &report["tiles"]["format"]), (&"globe".into(), &"3d-tiles".into()));
     let tileset: Value = serde_json::from_slice(&p.read("out/tileset.json")).unwrap();
     assert_eq!(tileset["asset"]["version"], "1.1");
+    // What is missing without any tile is a square degree, some 130 km across, not a few metres: readers would show nothing until they are near.
+    assert!(tileset["geometricError"].as_f64().unwrap() > 130_000.0);
     let root = &tileset["root"];
     let transform: Vec<f64> =
         root["transform"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
@@ -518,6 +520,8 @@ fn what_tiles_cannot_be_is_said() {
     fails("--max-error 1 --tile-format quantized-mesh", 3, "not in degrees");
     fails("--max-error 1 --tile-format quantized-mesh --uv", 2, "--uv");
     p.run("terrain tin a.asc out.glb --max-error 1 --tile-format glb").failed(2, "--tiles");
+    p.run("terrain tin a.asc out.glb --max-error 1 --tiles 2").failed(2, "a directory of many files");
+    p.run(&format!("terrain tin a.asc out --max-error 1 --tiles {SIDE}")).failed(2, "but 80 steps");
     // A grid without a sample to cover.
     p.write("void.raw", [0u8; 200]);
     p.run("terrain tin void.raw out --max-error 1 --tiles 2 --size 10x10 --type i16 --nodata 0")

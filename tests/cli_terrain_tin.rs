@@ -200,7 +200,8 @@ fn a_picture_shows_it() {
 #[test]
 fn what_cannot_be_is_said() {
     let p = place();
-    p.run(&format!("terrain tin hills.raw out.ply {RAW}")).failed(2, "--max-error");
+    p.run(&format!("terrain tin hills.raw out.ply {RAW}")).failed(2, "--max-error <E>|--triangles <N>");
+    p.run(&format!("terrain tin hills.raw out.pm --max-error 1 {RAW}")).failed(2, "progmesh terrain build");
     p.run(&format!("terrain tin hills.raw out.ply --max-error -1 {RAW}")).failed(2, "0 or more");
     p.run(&format!("terrain tin hills.raw out.xyz --max-error 1 {RAW}")).failed(2, "--to");
     p.run(&format!("terrain tin none.raw out.ply --max-error 1 {RAW}")).failed(3, "none.raw");

@@ -1,15 +1,14 @@
 //! Heights put aside in tiles, where the grid's own file has them in rows so wide that each would be unpacked again for block after block.
 
 use super::{BuildError, Control, Options, Store};
-use crate::terrain::{Raster, RasterError, Window, check_window, windows};
+use crate::terrain::{BlockCache, Raster, RasterError, Window, check_window, windows};
 use std::io;
+use std::sync::Arc;
 
 /// Samples of a tile.
 const TILE: usize = 1 << 16;
 /// Rows of a tile at most: a square.
 const ROWS: usize = 1 << 8;
-/// The greatest height, put there when all tiles are.
-const DONE: &str = "greatest.heights";
 
 /// Heights to make blocks of: the grid's own, or tiles of them in the store.
 pub(super) enum Heights<'a> {
@@ -70,27 +69,37 @@ pub(super) struct Tiles<'a> {
     rows: usize,
     /// Columns and rows of a tile.
     tile: [usize; 2],
+    /// Those looked at of late: blocks reach over the borders of tiles, and lie beside each other.
+    cache: BlockCache,
 }
 
 impl<'a> Tiles<'a> {
-    /// A row of tiles takes at most so many bytes as f64, if one of a single row of samples does.
+    /// A row of tiles takes at most so many bytes as f64, if one of a single row of samples does; so many are kept unpacked.
     fn new(raster: &dyn Raster, bytes: usize, store: &'a dyn Store) -> Self {
         let (columns, rows) = (raster.columns(), raster.rows());
         let most = (bytes / columns.saturating_mul(size_of::<f64>()).max(1)).clamp(1, ROWS);
         // Whole blocks of the grid, where several fit.
         let block = raster.block()[1].max(1);
         let high = if block <= most { most / block * block } else { most };
-        Tiles { store, columns, rows, tile: [TILE / high, high] }
+        Tiles { store, columns, rows, tile: [TILE / high, high], cache: BlockCache::new(bytes) }
     }
 
-    fn name(column: usize, row: usize) -> String {
-        format!("{column}-{row}.heights")
+    /// With its size: what was put there for other tiles is never taken for one of these.
+    fn name(&self, column: usize, row: usize) -> String {
+        let [wide, high] = self.tile;
+        format!("{column}-{row}-{wide}x{high}.heights")
+    }
+
+    /// Where the greatest height is put when all tiles are there.
+    fn done(&self) -> String {
+        let [wide, high] = self.tile;
+        format!("greatest-{wide}x{high}.heights")
     }
 
     /// Puts all tiles there, unless they are; returns the greatest height, without its sign. Row after row of tiles, on one thread: so no block of the grid is unpacked twice, unless it is higher than a tile and the grid keeps too few.
     fn fill(&self, raster: &dyn Raster, control: &dyn Control) -> Result<f64, BuildError> {
-        if self.store.has(DONE)? {
-            let bytes = self.store.get(DONE)?;
+        if self.store.has(&self.done())? {
+            let bytes = self.store.get(&self.done())?;
             let whole = bytes.first_chunk().copied().ok_or(io::ErrorKind::InvalidData);
             return Ok(f64::from_le_bytes(whole.map_err(io::Error::from)?));
         }
@@ -107,16 +116,19 @@ impl<'a> Tiles<'a> {
                 for line in band.heights().chunks_exact(self.columns) {
                     tile.extend_from_slice(&line[column..self.columns.min(column + wide)]);
                 }
-                self.store.put(&Self::name(column / wide, row / high), &pack(&tile))?;
+                self.store.put(&self.name(column / wide, row / high), &pack(&tile))?;
             }
         }
-        self.store.put(DONE, &most.to_le_bytes())?;
+        self.store.put(&self.done(), &most.to_le_bytes())?;
         Ok(most)
     }
 
-    fn get(&self, column: usize, row: usize, samples: usize) -> io::Result<Vec<f64>> {
-        let bytes = self.store.get(&Self::name(column, row))?;
-        unpack(&bytes).filter(|all| all.len() == samples).ok_or_else(|| io::ErrorKind::InvalidData.into())
+    fn get(&self, column: usize, row: usize, samples: usize) -> io::Result<Arc<[f64]>> {
+        let across = self.columns.div_ceil(self.tile[0]);
+        self.cache.get((0, row * across + column), || {
+            let bytes = self.store.get(&self.name(column, row))?;
+            unpack(&bytes).filter(|all| all.len() == samples).ok_or_else(|| io::ErrorKind::InvalidData.into())
+        })
     }
 }
 

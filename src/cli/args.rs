@@ -145,7 +145,7 @@ impl Output {
         })?;
         if format == Format::Pm {
             return Err(Failure::Usage(format!(
-                "{}: a progressive mesh is written by `progmesh encode`, from the mesh at full detail",
+                "{}: a progressive mesh is written by `progmesh encode`, from the mesh at full detail, and that of a height grid by `progmesh terrain build`",
                 self.name()
             )));
         }
@@ -166,6 +166,12 @@ impl Output {
             return Err(Failure::Usage(
                 "OUT is a directory here: it takes no --to, no --text and no -".into(),
             ));
+        }
+        if Format::from_name(&self.output.to_string_lossy()).is_some() {
+            return Err(Failure::Usage(format!(
+                "{}: OUT is a directory of many files here: leave out the ending of its name",
+                self.name()
+            )));
         }
         files::StagedDirectory::check(&self.output)
             .map_err(|e| Failure::Output(format!("{}: {e}", self.output.display())))?;

@@ -60,13 +60,18 @@ impl Globe {
         [p.dot(self.east), p.dot(self.up), -p.dot(self.north)]
     }
 
-    /// The normal of the surface through two points across and two points down, to the outside.
+    /// The normal of the surface through two points across and two points down, to the outside; at a pole, where all columns are one point, straight up.
     pub(super) fn up(&self, point: [f64; 2], across: [[f64; 3]; 2], down: [[f64; 3]; 2]) -> [f64; 3] {
+        let [low, high] = [0.0, 1.0].map(|h| DVec3::from(self.place(point, h)));
+        let up = high - low;
         let [across, down] = [across, down].map(|[a, b]| DVec3::from(b) - DVec3::from(a));
+        // What is left of a step of some metres at a pole is rounding, below a thousandth of a millimetre.
+        if [across, down].iter().any(|step| step.reject_from(up).length() < 1e-6) {
+            return up.into();
+        }
         let normal = down.cross(across);
         // Grids may be mirrored; up is where heights grow.
-        let [low, high] = [0.0, 1.0].map(|h| DVec3::from(self.place(point, h)));
-        (if normal.dot(high - low) < 0.0 { -normal } else { normal }).into()
+        (if normal.dot(up) < 0.0 { -normal } else { normal }).into()
     }
 
     /// From these coordinates, turned to z up as 3D Tiles does it, to earth-centred ones: a 4 x 4 matrix, column after column.
@@ -114,6 +119,25 @@ mod tests {
         assert_eq!(earth_centred([0.0, 0.0], 10.0), [MAJOR + 10.0, 0.0, 0.0]);
         let pole = earth_centred([0.0, 90.0], 0.0);
         assert!((pole[2] - 6_356_752.314_245).abs() < 1e-6 && pole[0].abs() < 1e-6);
+    }
+
+    #[test]
+    fn normals_at_the_poles_point_up() {
+        // All of the globe in steps of 30 degrees, no two heights beside each other the same.
+        let heights = (0..13 * 7).map(|i| f64::from(i * i % 97) * 50.0).collect();
+        let grid = Grid::new(13, 7, heights).unwrap();
+        let globe = Globe::new(&grid, Affine::north_up([-180.0, 90.0], [30.0, 30.0]), 1.0);
+        for (row, south) in [(0, false), (6, true)] {
+            for column in 0..13 {
+                let n = Space::Globe(globe).normal(&grid, [column, row]);
+                let [x, y, z] = globe.direction_to_earth(n);
+                let up = if south { -z } else { z };
+                assert!(up > 0.999_99 && x.hypot(y) < 1e-3, "{row} {column}: {x} {y} {z}");
+            }
+        }
+        // Elsewhere within the slopes.
+        let n = globe.direction_to_earth(Space::Globe(globe).normal(&grid, [6, 3]));
+        assert!(n[0] > 0.99, "{n:?}");
     }
 
     #[test]

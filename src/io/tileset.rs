@@ -23,10 +23,10 @@ pub fn tileset(tiles: &Tiles, transform: Option<[f64; 16]>, extras: Map<String, 
     let roots: Vec<(u32, [usize; 2])> = tiles.keys().copied().take_while(|k| k.0 == 0).collect();
     let made: Vec<Made> = roots.into_iter().filter_map(|root| node(tiles, root)).collect();
     let error = made.iter().map(|m| m.error).fold(0.0, f64::max);
+    let bounds = made.iter().map(|m| m.bounds).reduce(union).unwrap_or_default();
     let mut root = match made.len() {
         1 => made.into_iter().next().map(|m| m.json).unwrap_or_default(),
         _ => {
-            let bounds = made.iter().map(|m| m.bounds).reduce(union).unwrap_or_default();
             let children: Vec<Value> = made.into_iter().map(|m| Value::Object(m.json)).collect();
             let mut root = Map::new();
             root.insert("boundingVolume".into(), volume(bounds));
@@ -43,10 +43,12 @@ pub fn tileset(tiles: &Tiles, transform: Option<[f64; 16]>, extras: Map<String, 
         root.insert("extras".into(), Value::Object(extras));
     }
     let generator = concat!("progmesh ", env!("CARGO_PKG_VERSION"));
-    // What is seen where nothing is: twice the error of the coarsest.
+    // What is missing where no tile is shown is all of it. With an error like those of tiles, readers show nothing from where the first would do.
+    let [low, high] = bounds;
+    let size = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::hypot);
     json!({
         "asset": {"version": "1.1", "extras": {"generator": generator}},
-        "geometricError": 2.0 * error,
+        "geometricError": size.max(2.0 * error),
         "root": root,
     })
 }
@@ -112,6 +114,13 @@ mod tests {
         let made = tileset(&tiles, None, Map::new());
         let root = &made["root"];
         assert_eq!((&made["geometricError"], &root["geometricError"]), (&json!(18.0), &json!(9.0)));
+        // Larger ones are as wrong as they are wide where none is shown.
+        tiles.get_mut(&(1, [1, 1])).unwrap().bounds[1] = [300.0, 2.0, 400.0];
+        assert_eq!(
+            tileset(&tiles, None, Map::new())["geometricError"],
+            json!(300f64.hypot(2.0).hypot(400.0))
+        );
+        tiles.get_mut(&(1, [1, 1])).unwrap().bounds[1] = [6.0, 2.0, 4.0];
         assert_eq!(root["boundingVolume"]["box"][0], json!(3.0));
         assert_eq!(root["boundingVolume"]["box"][1], json!(-2.0));
         assert_eq!(root["children"].as_array().map(Vec::len), Some(2));

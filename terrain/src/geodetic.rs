@@ -24,6 +24,8 @@ pub struct Geodetic {
     top: usize,
     /// From columns and rows of the grid given to those of the lattice.
     from_samples: Affine,
+    /// The grid goes round the globe, but does not begin where tiles do: it was turned.
+    turned: bool,
 }
 
 /// Why there are no such tiles.
@@ -69,6 +71,13 @@ impl Geodetic {
         // 0 to 360 is as common as -180 to 180.
         if west >= 180.0 - slack {
             west -= 360.0;
+        }
+        if !(west >= -180.0 - slack && west + width <= 180.0 + slack) && width + dx >= 360.0 - slack {
+            let (turned, first) = turn(grid, west, dx);
+            let mut made = Geodetic::new(&turned, Affine([dx, 0.0, first, 0.0, dy, north]), across)?;
+            made.turned = true;
+            made.from_samples.0[2] = (west + 180.0) / made.step() - made.left as f64;
+            return Ok(made);
         }
         for (from, to, most) in [(west, west + width, 180.0), (north - height, north, 90.0)] {
             if !(from >= -most - slack && to <= most + slack) {
@@ -119,7 +128,7 @@ impl Geodetic {
             -dy / step,
             top as f64 - (north + 90.0) / step,
         ]);
-        Ok(Geodetic { grid, level, steps, exact, left, top, from_samples })
+        Ok(Geodetic { grid, level, steps, exact, left, top, from_samples, turned: false })
     }
 
     /// Degrees of a lattice step.
@@ -135,7 +144,13 @@ impl Geodetic {
         Affine::north_up([self.left as f64 * step - 180.0, self.top as f64 * step - 90.0], [step, step])
     }
 
-    /// Where a column and a row of the grid that it was made of lie on the lattice, in columns and rows.
+    /// Steps of the lattice once round the globe, if the grid goes round it and was turned so that it begins at 180 degrees west: places beyond the last column are those before the first then.
+    #[must_use]
+    pub fn turn(&self) -> Option<f64> {
+        self.turned.then(|| 360.0 / self.step())
+    }
+
+    /// Where a column and a row of the grid that it was made of lie on the lattice, in columns and rows; of one that was [turned](Geodetic::turn) that may be a turn away.
     #[must_use]
     pub fn on_lattice(&self, point: [f64; 2]) -> [f64; 2] {
         self.from_samples.apply(point)
@@ -177,6 +192,19 @@ impl Geodetic {
     }
 }
 
+/// A grid once round the globe from its first sample at 180 degrees west or beside on, to 180 degrees east if it has one there, and the longitude of that first sample.
+fn turn(grid: &Grid, west: f64, dx: f64) -> (Grid, f64) {
+    let around = (360.0 / dx).round().max(1.0) as i64;
+    let first = ((-180.0 - west) / dx - NEAR).ceil() as i64;
+    let last = ((180.0 - west) / dx + NEAR).floor() as i64;
+    // A grid that ends where it began has a column more; it is not looked at.
+    let columns: Vec<usize> =
+        (first..=last).map(|c| (c.rem_euclid(around) as usize).min(grid.columns() - 1)).collect();
+    let row = |y: usize| &grid.heights()[y * grid.columns()..][..grid.columns()];
+    let heights = (0..grid.rows()).flat_map(|y| columns.iter().map(move |&x| row(y)[x])).collect();
+    (Grid::of_finite(columns.len(), grid.rows(), heights), west + first as f64 * dx)
+}
+
 /// The height of the grid's own triangle at a place in the cell from this sample on. Corners without a weight may be void.
 fn height_at(grid: &Grid, [x, y]: [usize; 2], [fx, fy]: [f64; 2]) -> f64 {
     let at = |dx: usize, dy: usize| grid.height(x + dx, y + dy).unwrap_or(f64::NAN);
@@ -209,6 +237,55 @@ mod tests {
         let four = Geodetic::new(&grid, Affine::north_up([-45.0, 45.0], [0.5, 0.5]), 4).unwrap();
         assert_eq!((four.level, four.cuts(4).tiles(), four.cuts(3).tiles()), (4, [4, 4], [2, 2]));
         assert_eq!((four.cuts(0).tiles(), four.tile_of(0, [0, 0])), ([1, 1], [0, 0]));
+    }
+
+    #[test]
+    fn a_grid_round_the_globe_may_begin_anywhere() {
+        // Height is the longitude, -180 to 175 (180 is -180), times 100 plus the row.
+        let of =
+            |longitude: f64, row: usize| ((longitude + 180.0).rem_euclid(360.0) - 180.0) * 100.0 + row as f64;
+        for (west, columns, shift) in
+            [(0.0, 72, 0.0), (0.0, 73, 0.0), (90.0, 72, 0.0), (2.5, 72, 2.5), (-200.0, 72, 0.0)]
+        {
+            let heights =
+                (0..37 * columns).map(|i| of(west + 5.0 * (i % columns) as f64, i / columns)).collect();
+            let grid = Grid::new(columns, 37, heights).unwrap();
+            let transform = Affine::north_up([west, 90.0], [5.0, 5.0]);
+            let made = Geodetic::new(&grid, transform, 4).unwrap();
+            // Lattices begin at the border of a tile: what lies half a step beside is interpolated.
+            assert_eq!(made.exact, shift == 0.0, "{west} {columns}");
+            let (lattice, turn) = (made.transform(), made.turn().unwrap());
+            assert_eq!(turn, 360.0 / made.step());
+            for x in 0..made.grid.columns() {
+                let [longitude, _] = lattice.apply([x as f64, 0.0]);
+                assert!((-180.0..=180.0).contains(&longitude));
+                // A plane but for the step at 180 degrees.
+                if longitude.abs() < 174.0 {
+                    let height = made.grid.height(x, 0).unwrap();
+                    assert!((height - 100.0 * longitude).abs() < 1e-6, "{west} {longitude}: {height}");
+                }
+            }
+            if shift == 0.0 {
+                let last = made.grid.columns() - 1;
+                assert_eq!(made.grid.columns(), 73);
+                assert_eq!(
+                    (made.grid.height(0, 3), made.grid.height(last, 3)),
+                    (Some(-17_997.0), Some(-17_997.0))
+                );
+                assert_eq!(made.cuts(0).tiles(), [2, 1]);
+            }
+            // Samples are found again, perhaps a turn away.
+            let [x, y] = made.on_lattice([7.0, 5.0]);
+            let [longitude, latitude] = lattice.apply([x.rem_euclid(turn), y]);
+            let own = ((west + 35.0 + 180.0).rem_euclid(360.0)) - 180.0;
+            assert!((longitude - own).abs() < 1e-9 && (latitude - 65.0).abs() < 1e-9);
+        }
+        // Not all the way round: no.
+        let grid = plane(60, 3);
+        assert!(matches!(
+            Geodetic::new(&grid, Affine::north_up([10.0, 5.0], [5.0, 5.0]), 1),
+            Err(GeodeticError::Outside { .. })
+        ));
     }
 
     #[test]

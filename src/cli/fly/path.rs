@@ -120,7 +120,14 @@ impl PathArgs {
     pub(super) fn open(&self, memory: Option<usize>, warnings: &mut Warnings) -> Result<Source, Failure> {
         let path = match self.path.as_str() {
             "circle" | "lemniscate" => Vec::new(),
-            path => files::read_all(Path::new(path)).map_err(|e| Failure::Input(format!("{path}: {e}")))?,
+            path => files::read_all(Path::new(path)).map_err(|e| {
+                let known = if e.kind() == std::io::ErrorKind::NotFound {
+                    "; --path takes circle, lemniscate or a file of cameras"
+                } else {
+                    ""
+                };
+                Failure::Input(format!("{path}: {e}{known}"))
+            })?,
         };
         let Some(grid) = &self.grid else { return Ok(Source { path, grid: None }) };
         Ok(Source { path, grid: Some(open_plain(grid, memory.map(grid_cache), warnings)?) })

@@ -89,6 +89,7 @@ impl BreaklineArgs {
             let points: Option<Vec<[f64; 2]>> = line.iter().map(place).collect();
             let points = points.ok_or_else(|| failed("the grid's transform has no inverse".into()))?;
             for pair in points.windows(2) {
+                let pair = within_turn([pair[0], pair[1]], lattice.and_then(Geodetic::turn));
                 let Some(clipped) = clip([pair[0], pair[1]], most) else {
                     facts.beyond += 1;
                     continue;
@@ -110,6 +111,13 @@ impl BreaklineArgs {
         }));
         Ok((steps, Some(facts)))
     }
+}
+
+/// A piece moved by whole turns, so that its middle is from 0 to one.
+fn within_turn(piece: [[f64; 2]; 2], turn: Option<f64>) -> [[f64; 2]; 2] {
+    let Some(turn) = turn else { return piece };
+    let turns = ((piece[0][0] + piece[1][0]) / (2.0 * turn)).floor();
+    piece.map(|[x, y]| [x - turns * turn, y])
 }
 
 /// The part of a straight line within 0 to `most` (Liang & Barsky 1984).
@@ -150,7 +158,15 @@ fn clip([a, b]: [[f64; 2]; 2], most: [f64; 2]) -> Option<[[f64; 2]; 2]> {
 
 #[cfg(test)]
 mod tests {
-    use super::clip;
+    use super::{clip, within_turn};
+
+    #[test]
+    fn pieces_are_turned_to_where_the_lattice_is() {
+        let piece = [[350.0, 1.0], [370.0, 2.0]];
+        assert_eq!(within_turn(piece, None), piece);
+        assert_eq!(within_turn(piece, Some(360.0)), [[-10.0, 1.0], [10.0, 2.0]]);
+        assert_eq!(within_turn([[-30.0, 1.0], [-20.0, 2.0]], Some(360.0)), [[330.0, 1.0], [340.0, 2.0]]);
+    }
 
     #[test]
     fn lines_are_cut_at_the_grid() {

@@ -26,7 +26,7 @@ use std::time::Instant;
 /// integers. Voids stay open: the surface is that of the grid triangles of three valid samples, with the same outline (or a simpler one:
 /// --outline-tolerance). Vertices lie at samples; their heights are free within the error, unless --on-samples keeps them.
 #[derive(clap::Args, Debug)]
-#[command(after_help = "\
+#[command(group(clap::ArgGroup::new("target").args(["max_error", "triangles"]).required(true).multiple(true)), after_help = "\
 Examples:
   progmesh terrain tin alps.tif alps.ply --max-error 5
   progmesh terrain tin N57E011.hgt coast.glb --max-error 10 --exaggeration 2 --png coast.png
@@ -48,7 +48,7 @@ pub(crate) struct Args {
 
     /// The farthest that a sample may lie above or below the surface, in the grid's units
     #[arg(long, value_name = "E", value_parser = args::not_negative, allow_negative_numbers = true,
-          required_unless_present = "triangles", help_heading = "Target")]
+          help_heading = "Target")]
     max_error: Option<f64>,
     /// Where the error holds
     #[arg(long, value_enum, default_value_t = ContractName::Samples, help_heading = "Target")]
@@ -334,6 +334,13 @@ impl Args {
             };
             let dress = self.dress.dress(flat, &source)?;
             let grid = whole(&file, &source)?;
+            let steps = grid.columns().max(grid.rows()) - 1;
+            if across > steps.max(1) {
+                return Err(Failure::Usage(format!(
+                    "--tiles {across}: {file} has but {} steps from sample to sample along its longer side",
+                    thousands(steps)
+                )));
+            }
             let (grid, filled) = self.filled(&file, grid, warnings);
             let space = match (source.georeference.transform, flat) {
                 (Some(transform), Space::World { exaggeration, .. }) if globe => {
@@ -534,8 +541,9 @@ fn bent(b: &Breaklines) -> Option<String> {
 
 fn isolated_samples(count: usize) -> Option<String> {
     (count > 0).then(|| {
+        let samples = if count == 1 { "sample has" } else { "samples have" };
         format!(
-            "{} valid samples have no two valid neighbours to make a triangle with: left out",
+            "{} valid {samples} no two valid neighbours to make a triangle with: left out",
             thousands(count)
         )
     })

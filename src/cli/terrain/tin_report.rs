@@ -60,8 +60,14 @@ impl OutlineReport {
 
     pub(super) fn warning(&self) -> Option<String> {
         (self.dropped > 0).then(|| {
+            let samples = if self.dropped == 1 {
+                "sample beside the outline is"
+            } else {
+                "samples beside the outline are"
+            };
+            let steps = if self.tolerance == 1.0 { "step" } else { "steps" };
             format!(
-                "{} valid samples beside the outline are not covered: it was simplified by up to {} samples",
+                "{} valid {samples} not covered: it was simplified by up to {} {steps}",
                 thousands(self.dropped),
                 short(self.tolerance)
             )

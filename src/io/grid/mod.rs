@@ -213,6 +213,12 @@ pub enum GridError {
     /// Raw samples need a size and a type.
     #[error("raw samples need a size and a type")]
     RawNeedsSize,
+    /// There is nothing in it.
+    #[error("the file is empty")]
+    Empty,
+    /// Its name says a format whose first bytes are always the same, and it begins otherwise.
+    #[error("its name says {0}, and it does not begin like one; say what it is (tiff, hgt, ascii, png, raw)")]
+    OtherThanNamed(&'static str),
     /// The content is wrong.
     #[error(transparent)]
     Decode(#[from] DecodeError),
@@ -226,8 +232,15 @@ pub enum GridError {
 /// [`GridError`] for what is no grid, or one of a kind that is not read.
 pub fn open(source: Arc<dyn ReadAt>, name: &str, options: &GridOptions) -> Result<GridFile, GridError> {
     let head = source::bytes_at(&*source, 0, source.length().min(16)).unwrap_or_default();
-    let told = || GridFormat::from_bytes(&head).or_else(|| GridFormat::from_name(name));
-    let format = options.format.or_else(told).ok_or(GridError::UnknownFormat)?;
+    if head.is_empty() && options.size.is_none() {
+        return Err(GridError::Empty);
+    }
+    let (inside, named) = (GridFormat::from_bytes(&head), GridFormat::from_name(name));
+    if let (None, None, Some(format @ (GridFormat::Tiff | GridFormat::Png))) = (options.format, inside, named)
+    {
+        return Err(GridError::OtherThanNamed(if format == GridFormat::Tiff { "TIFF" } else { "PNG" }));
+    }
+    let format = options.format.or(inside).or(named).ok_or(GridError::UnknownFormat)?;
     let (mut georeference, mut encoding) = (Georeference::default(), Encoding::Plain);
     let (raw, facts): (Box<dyn Raster>, Facts) = match format {
         GridFormat::Tiff => {

@@ -18,11 +18,16 @@ pub struct Relief {
     low: Vec<f32>,
     /// The greatest; empty for cells of one sample.
     high: Vec<f32>,
+    /// For each sample how many from there on in its row have the same height, up to 255; empty where few have, and for larger cells.
+    level: Vec<u8>,
     /// What rounding to f32 changed at most.
     rounding: f64,
     /// Greatest height without its sign.
     greatest: f64,
 }
+
+/// Level rows are looked for where one sample of so many has the height of the next.
+const LEVEL: usize = 2;
 
 /// Rows of cells read at once.
 const BAND: usize = 64;
@@ -45,6 +50,7 @@ impl Relief {
             across,
             low: vec![],
             high: vec![],
+            level: vec![],
             rounding: 0.0,
             greatest: 0.0,
         };
@@ -57,7 +63,29 @@ impl Relief {
                 .read(Window::new(window.column, window.row + first, window.columns, rows), &mut heights)?;
             relief.append(&heights, window.columns);
         }
+        relief.find_level();
         Ok(relief)
+    }
+
+    /// Over a sea every triangle is as good as its samples are many: a row of equal heights is measured at its ends.
+    fn find_level(&mut self) {
+        if self.cell > 1 {
+            return;
+        }
+        let equal = self.low.windows(2).filter(|h| h[0] == h[1]).count();
+        if equal * LEVEL < self.low.len() {
+            return;
+        }
+        self.level = vec![1; self.low.len()];
+        for (heights, level) in
+            self.low.chunks_exact(self.across).zip(self.level.chunks_exact_mut(self.across))
+        {
+            for k in (0..self.across.saturating_sub(1)).rev() {
+                if heights[k] == heights[k + 1] {
+                    level[k] = level[k + 1].saturating_add(1);
+                }
+            }
+        }
     }
 
     fn append(&mut self, heights: &[f64], columns: usize) {
@@ -133,6 +161,8 @@ impl Relief {
                     most = if e > most { e } else { most };
                     at += dx;
                 }
+            } else if let Some(level) = self.level.get(from..=from + (x1 - x0) as usize) {
+                most = most.max(level_row(heights, level, at, dx));
             } else {
                 most = most.max(long_row(heights, at, dx));
             }
@@ -317,6 +347,26 @@ fn long_row(heights: &[f32], start: f64, step: f64) -> f64 {
     most
 }
 
+/// As [`long_row`], to the last bit, where `level` says how many samples from each on have its height: the line runs away from these to one side, so
+/// the first or the last of them is the farthest, and rounding keeps that order.
+#[inline(never)]
+fn level_row(heights: &[f32], level: &[u8], start: f64, step: f64) -> f64 {
+    let (mut most, mut k) = (0.0f64, 0);
+    let mut look = |k: usize| {
+        let e = (start + step * k as f64 - f64::from(heights[k])).abs();
+        most = if e > most { e } else { most };
+    };
+    while k < heights.len() {
+        look(k);
+        let last = (k + usize::from(level[k])).min(heights.len()) - 1;
+        if last > k {
+            look(last);
+        }
+        k = last + 1;
+    }
+    most
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -359,6 +409,34 @@ mod tests {
                 let coarse = Relief::read(&grid, all, most).unwrap();
                 prop_assert!(coarse.is_coarse());
                 prop_assert!(Gauge::new(&coarse).error(t, f64::INFINITY) >= want);
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn rows_with_level_parts_are_measured_as_others(
+            parts in proptest::collection::vec((-3i32..3, 1usize..300), 1..8),
+            (start, step) in (-9.0f64..9.0, -0.7f64..0.7),
+        ) {
+            let row: Vec<f64> =
+                parts.iter().flat_map(|&(h, n)| std::iter::repeat_n(if h == -3 { f64::NAN } else { 0.1 * f64::from(h) }, n)).collect();
+            let n = row.len();
+            let grid = Grid::new(n, 2, [&row[..], &row[..]].concat()).unwrap();
+            let mut relief = Relief::read(&grid, Window::new(0, 0, n, 2), 2 * n).unwrap();
+            relief.level.clear();
+            relief.find_level();
+            if let Some(level) = relief.level.get(n..) {
+                let heights = &relief.low[n..];
+                let all = level_row(heights, level, start, step);
+                prop_assert_eq!(all.to_bits(), long_row(heights, start, step).to_bits());
+                for (k, &l) in level.iter().enumerate() {
+                    let l = usize::from(l);
+                    prop_assert!(l >= 1 && k + l <= n);
+                    prop_assert!(l == 1 || heights[k..k + l].iter().all(|&h| h == heights[k]));
+                }
+            } else {
+                prop_assert!(relief.low.windows(2).filter(|h| h[0] == h[1]).count() * LEVEL < 2 * n);
             }
         }
     }
