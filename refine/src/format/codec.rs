@@ -180,10 +180,10 @@ impl<'a> Codec<'a> {
     /// Does a split.
     #[inline]
     fn apply(&mut self, v: u32, cuts: &Cuts, code: SplitCode, made: ([f64; 3], u16)) {
-        let u = self.walk.vertices.len();
+        let u = self.walk.vertices.len() as u32;
+        let made = (made.0, made.1, NEW);
         self.walk.split(v, &self.ring, (cuts.first, cuts.count), [cuts.left, cuts.right], code, made);
-        self.walk.vertices[u].visit = NEW;
-        self.list.extend([v, u as u32]);
+        self.list.extend_from_slice(&[v, u]);
     }
 
     /// A level of error: mostly a little below that of the split before at the vertex.

@@ -61,8 +61,15 @@ pub(super) trait Coder {
     }
 
     /// A number below 76: as long as it is not below 15, 15 is taken off it.
-    #[inline]
+    #[inline(always)]
     fn length(&mut self, models: &mut [Nibble; 5], value: u32) -> u32 {
+        let [first, others @ ..] = models;
+        let part = self.nibble(first, value.min(15));
+        if part < 15 { part } else { 15 + self.rest_of_length(others, value.saturating_sub(15)) }
+    }
+
+    #[cold]
+    fn rest_of_length(&mut self, models: &mut [Nibble; 4], value: u32) -> u32 {
         let mut done = 0;
         for m in models {
             let part = self.nibble(m, value.saturating_sub(done).min(15));

@@ -97,18 +97,29 @@ pub(super) struct Ring {
     pub(super) closed: bool,
     /// The squares of all lengths, summed up in turn.
     pub(super) squares: f32,
+    /// Those of the first edges, side by side: they are compared many at a time.
+    lengths: [f32; FEW],
     /// The most edges that it is to have.
     pub(super) most: usize,
 }
 
 impl Default for Ring {
     fn default() -> Self {
-        Ring { room: vec![Edge::NOWHERE; ROOM], edges: 0, closed: false, squares: 0.0, most: usize::MAX }
+        Ring {
+            room: vec![Edge::NOWHERE; ROOM],
+            edges: 0,
+            closed: false,
+            squares: 0.0,
+            lengths: [0.0; FEW],
+            most: usize::MAX,
+        }
     }
 }
 
 /// Edges that there is room for at first.
 const ROOM: usize = 32;
+/// Rings of no more edges are looked at as bits of one number.
+const FEW: usize = 31;
 
 /// An edge of a ring as a cut: as a half of the face that goes to the new vertex and of that which stays, as far as they are there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,8 +132,10 @@ impl Cut {
     /// The half in the later-made of its faces, and whether that goes to the new vertex.
     #[inline]
     pub(super) fn name(self) -> (u32, bool) {
-        let inner = self.inner != NONE && (self.outer == NONE || self.outer >> 3 <= self.inner >> 3);
-        (if inner { self.inner } else { self.outer }, inner)
+        let Cut { inner, outer } = self;
+        let is_inner = (inner != NONE) & ((outer == NONE) | (outer >> 3 <= inner >> 3));
+        // No branch: it is the one as often as the other.
+        (outer ^ (inner ^ outer) & (is_inner as u32).wrapping_neg(), is_inner)
     }
 }
 
@@ -133,15 +146,53 @@ impl Ring {
         self.edges
     }
 
-    /// All of them, and what stands behind them.
-    #[inline(always)]
-    pub(super) fn and_next(&self) -> &[Edge] {
-        self.room.get(..self.edges + 1).unwrap_or_default()
-    }
-
+    /// All of them.
     #[inline(always)]
     pub(super) fn all(&self) -> &[Edge] {
         self.room.get(..self.edges).unwrap_or_default()
+    }
+
+    /// Edge `first` and the `count` behind it; those that are counted more than once around only after [`Ring::unroll`].
+    #[inline(always)]
+    pub(super) fn run(&self, first: usize, count: usize) -> &[Edge] {
+        self.room.get(first..=first + count).unwrap_or_default()
+    }
+
+    /// Lets edges of a closed ring up to `last` be counted once around.
+    #[inline(always)]
+    pub(super) fn unroll(&mut self, last: usize) {
+        if self.room.len() <= last {
+            self.room.resize(last + 1, Edge::NOWHERE);
+        }
+        // The first stands behind the last already.
+        for k in self.edges + 1..last + 1 {
+            self.room[k] = self.room[k - self.edges];
+        }
+    }
+
+    /// Which edges are longer than the square root of `mean`, if they are few: bit k + 1 for edge k, counted once around, with nothing long before or behind the edges of an open ring.
+    #[inline(always)]
+    pub(super) fn longer(&self, mean: f32) -> Option<u64> {
+        let n = self.edges;
+        if n > FEW {
+            return None;
+        }
+        let mut bits = few_longer::<8>(&self.lengths, mean);
+        if n > 8 {
+            bits = few_longer::<FEW>(&self.lengths, mean);
+        }
+        let bits = bits as u64 & ((1 << n) - 1);
+        Some(if self.closed { (bits | bits << n) << 1 | bits >> (n - 1) } else { bits << 1 })
+    }
+
+    /// Whether the edge before edge `k`, which is counted once around, is longer than that, in bit 0, it, and the one behind: as [`Ring::longer`] says of few.
+    #[cold]
+    pub(super) fn longer_at(&self, mean: f32, k: usize) -> usize {
+        let long = |k: usize| (self.room[k].to[3] > mean) as usize;
+        let at = self.around(k);
+        let before =
+            if k > 0 { long(self.around(k - 1)) } else { self.closed as usize & long(self.edges - 1) };
+        before | long(at) << 1 | long(at + 1) << 2
     }
 
     /// Faces.
@@ -190,6 +241,12 @@ impl Ring {
     pub(super) fn around(&self, k: usize) -> usize {
         if k >= self.edges { k - self.edges } else { k }
     }
+}
+
+/// Of the first `N` squares those that are greater, as bits.
+#[inline(always)]
+fn few_longer<const N: usize>(squares: &[f32; FEW], mean: f32) -> u32 {
+    squares.iter().take(N).zip(0..).fold(0, |bits, (&s, k)| bits | ((s > mean) as u32) << k)
 }
 
 /// A place seen from another.
@@ -386,6 +443,9 @@ impl Walk {
                 let step = (STEPS >> (8 * (entry & 7))) as usize;
                 *room = self.edge(entry, face[step & 3], &t);
                 squares += room.to[3];
+                if let Some(length) = ring.lengths.get_mut(n) {
+                    *length = room.to[3];
+                }
                 let link = face[step >> 4 & 7];
                 if link == NONE {
                     return self.open(start, (turn(entry), n + 1), &t, ring);
@@ -434,13 +494,14 @@ impl Walk {
         room.rotate_right(back);
         ring.squares = 0.0;
         room.iter().for_each(|e| ring.squares += e.to[3]);
+        ring.lengths.iter_mut().zip(&*room).for_each(|(l, e)| *l = e.to[3]);
         (ring.closed, ring.edges) = (false, room.len());
         // With the room that others have found there.
         room.resize((room.len() + 1).max(ROOM), Edge::NOWHERE);
         Some(())
     }
 
-    /// Does a split of `v`: the `count` faces behind edge `first` of its ring go to the new vertex, which is at `place`; both cuts as the ring has them.
+    /// Does a split of `v`: the `count` faces behind edge `first` of its ring, which is unrolled up to there, go to the new vertex, which is at `place`; both cuts as the ring has them.
     #[inline]
     pub(super) fn split(
         &mut self,
@@ -449,27 +510,34 @@ impl Walk {
         (first, count): (usize, usize),
         [left, right]: [Cut; 2],
         code: SplitCode,
-        (place, level): ([f64; 3], u16),
+        (place, level, visit): ([f64; 3], u16, u8),
     ) {
         let u = self.vertices.len() as u32;
         let two = code.two_faces();
-        let tips = [ring.far(first), if two { ring.far(first + count) } else { NONE }];
-        let mut k = first;
-        for _ in 0..count {
-            let entry = ring.room[k].half;
-            if entry == NONE {
+        let run = ring.run(first, count);
+        let end = |e: Option<&Edge>| e.map_or(NONE, |e| e.far);
+        let tips = [end(run.first()), if two { end(run.last()) } else { NONE }];
+        for e in run.iter().take(count) {
+            if e.half == NONE {
                 break;
             }
-            self.face_mut(entry >> 3)[NEAR[(entry & 7) as usize] as usize & 3] = u;
-            k = ring.around(k + 1);
+            self.face_mut(e.half >> 3)[NEAR[(e.half & 7) as usize] as usize & 3] = u;
         }
         // Both faces are across the edge between old and new vertex.
-        let ends = [code.left().1, code.right().1];
-        let [l, r] = [0, 1].map(|k| (self.faces.len() as u32 + k) << 3 | 1 << 1 | !ends[k as usize] as u32);
+        let ends = [after_tip(code.0), after_tip(code.0 >> 3)];
+        let f = self.faces.len() as u32;
+        let [l, r] = [f << 3 | 1 << 1 | !ends[0] as u32, (f + 1) << 3 | 1 << 1 | !ends[1] as u32];
         let between = if two { r ^ l & 1 } else { NONE };
-        let (old, mut at_u) = self.insert(ends[0], [v, u, tips[0]], left, between);
+        let (face, [old, mut at_u]) = between_cut(f, ends[0], [v, u, tips[0]], left, between);
+        self.faces.push(face);
+        self.link(left.outer, old);
+        self.link(left.inner, at_u);
         if two {
-            at_u = self.insert(ends[1], [v, u, tips[1]], right, l ^ r & 1).1;
+            let (face, [old, new]) = between_cut(f + 1, ends[1], [v, u, tips[1]], right, l ^ r & 1);
+            self.faces.push(face);
+            self.link(right.outer, old);
+            self.link(right.inner, new);
+            at_u = new;
         } else {
             // At the border, by the edge between both.
             at_u = turn(at_u);
@@ -488,7 +556,7 @@ impl Walk {
             exact.push(place);
         }
         let place = seen_from(&self.origin, place);
-        self.vertices.push(Vertex { place, level, valence, visit: 0 });
+        self.vertices.push(Vertex { place, level, valence, visit });
         for tip in tips {
             self.changes(tip);
             if let Some(t) = self.vertices.get_mut(tip as usize) {
@@ -498,32 +566,33 @@ impl Walk {
         }
     }
 
-    /// Appends a face (tip first) into an opening, with the link of its edge between old and new vertex; returns that between the tip and the old one, seen from the old, and that between the tip and
-    /// the new one, seen from that.
-    #[inline(always)]
-    fn insert(&mut self, new_next: bool, [v, u, tip]: [u32; 3], at: Cut, between: u32) -> (u32, u32) {
-        let face = self.faces.len() as u32;
-        let (b, c) = if new_next { (u, v) } else { (v, u) };
-        // Edge 0 ends at corner 1, edge 2 begins at corner 2.
-        let (after, before) = (face << 3, face << 3 | 2 << 1 | 1);
-        let (old, new) = if new_next { (before, after) } else { (after, before) };
-        let (to_after, to_before) = if new_next { (at.inner, at.outer) } else { (at.outer, at.inner) };
-        // Seen from where the face ends the edge.
-        let link = |to: u32, from: u32| if to == NONE { NONE } else { to ^ from & 1 };
-        self.faces.push([tip, b, c, link(to_after, after), between, link(to_before, before)]);
-        if at.outer != NONE {
-            self.link(at.outer, old);
-        }
-        if at.inner != NONE {
-            self.link(at.inner, new);
-        }
-        (old, new)
-    }
-
-    /// Links half `x` to `y`, both seen from the same vertex.
+    /// Links half `x`, if there is one, to `y`, both seen from the same vertex.
     #[inline(always)]
     fn link(&mut self, x: u32, y: u32) {
-        self.face_mut(x >> 3)[LINK[x as usize & 7] as usize] = y ^ x & 1;
+        if x != NONE {
+            self.face_mut(x >> 3)[LINK[x as usize & 7] as usize] = y ^ x & 1;
+        }
+    }
+}
+
+/// Of the three low bits of a code: the new vertex follows the tip.
+#[inline(always)]
+fn after_tip(code: u16) -> bool {
+    0b0011_1000 >> (code & 7) & 1 == 1
+}
+
+/// Face `face` (tip first) in an opening, with the link of its edge between old and new vertex; and the half between the tip and the old one, seen from the old, and that between the tip and
+/// the new one, seen from that.
+#[inline(always)]
+fn between_cut(face: u32, new_next: bool, [v, u, tip]: [u32; 3], at: Cut, between: u32) -> (Face, [u32; 2]) {
+    // Edge 0 ends at corner 1, edge 2 begins at corner 2.
+    let (after, before) = (face << 3, face << 3 | 2 << 1 | 1);
+    // Seen from where the face ends the edge.
+    let link = |to: u32, from: u32| if to == NONE { NONE } else { to ^ from & 1 };
+    if new_next {
+        ([tip, u, v, link(at.inner, after), between, link(at.outer, before)], [before, after])
+    } else {
+        ([tip, v, u, link(at.outer, after), between, link(at.inner, before)], [after, before])
     }
 }
 

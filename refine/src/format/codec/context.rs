@@ -105,10 +105,7 @@ impl Known {
     pub(super) fn vertex(&self, v: u32) -> u32 {
         match v.checked_sub(self.vertices) {
             None => v,
-            Some(k) => match self.ids.get(k as usize) {
-                Some(&id) => self.vertices + id,
-                None => self.vertices + self.first + (k - self.ids.len() as u32),
-            },
+            Some(k) => self.vertices + behind(&self.ids, k, self.first),
         }
     }
 
@@ -117,13 +114,19 @@ impl Known {
     pub(super) fn cut(&self, cut: u32) -> u32 {
         let face = match (cut >> 2).checked_sub(self.faces) {
             None => cut >> 2,
-            Some(k) => match self.of_face.get(k as usize) {
-                Some(&face) => face,
-                None => self.first_face + (k - self.of_face.len() as u32),
-            },
+            Some(k) => behind(&self.of_face, k, self.first_face),
         };
         face << 2 | cut & 3
     }
+}
+
+/// The `k`-th of `known`; behind those one follows the other, from `first` on. No branch: it is the one as often as the other.
+#[inline(always)]
+fn behind(known: &[u32], k: u32, first: u32) -> u32 {
+    let n = known.len() as u32;
+    let at = known.get(k.min(n.saturating_sub(1)) as usize).copied().unwrap_or_default();
+    let later = ((k >= n) as u32).wrapping_neg();
+    at ^ (at ^ first.wrapping_add(k.wrapping_sub(n))) & later
 }
 
 /// What a writer needs for contexts, and what it knows of that of one chunk.

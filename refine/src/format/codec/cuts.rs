@@ -1,7 +1,7 @@
 //! Where a split opens the ring of its vertex.
 
 use super::super::coder::{Bit, Coder};
-use super::super::walk::{Cut, cut, turn};
+use super::super::walk::{Cut, Ring, cut, turn};
 use super::Codec;
 use crate::aif::NONE;
 use crate::progressive::SplitCode;
@@ -99,11 +99,10 @@ impl Codec<'_> {
         if left == NONE {
             return None;
         }
-        code |=
-            if inner { SplitCode::L_INNER } else { 0 } | if left & 1 == 1 { SplitCode::L_STARTS } else { 0 };
-        if two && cuts.right.name().1 {
-            code |= SplitCode::R_INNER;
-        }
+        let flag = |on: bool, flag: u16| flag & (on as u16).wrapping_neg();
+        code |= flag(inner, SplitCode::L_INNER) | flag(left & 1 == 1, SplitCode::L_STARTS);
+        code |= flag(two & cuts.right.name().1, SplitCode::R_INNER);
+        self.ring.unroll(cuts.first + cuts.count);
         Some((SplitCode(code), cuts))
     }
 
@@ -142,49 +141,13 @@ impl Codec<'_> {
         two: bool,
         want: Option<(usize, usize)>,
     ) -> Option<Cuts> {
-        let ring = &self.ring;
-        let (faces, n, room) = (ring.faces(), ring.edges(), ring.and_next());
-        let mean = ring.squares / n as f32;
-        let long = |k: usize| (room[k].to[3] > mean) as usize;
-        let (left, right) = want.unwrap_or_default();
-        // With one face the whole fan may stay.
-        let edges = if two { faces } else { n };
-        let models = &mut self.m.left[state.min(2) as usize];
-        // Whether the edge before and edge `first` are long; the edge behind comes above them.
-        let mut shape = (ring.closed as usize & long(n - 1)) | long(0) << 1;
-        let mut first = 0;
-        while first + 1 < edges {
-            shape |= long(first + 1) << 2;
-            let model = &mut models[(edges - first - 2).min(LEFT - 1)][shape & 7];
-            if c.bit(model, first == left) {
-                break;
-            }
-            first += 1;
-            shape >>= 1;
-        }
-        let mut count = faces - first;
-        if two {
-            let most = if ring.closed { faces.checked_sub(1)? } else { count };
-            count = 1;
-            let mut at = ring.around(first + 1);
-            shape = long(first) | long(at) << 1;
-            while count < most {
-                shape |= long(at + 1) << 2;
-                let models = &mut self.m.right[(count - 1).min(DONE - 1)];
-                let model = &mut models[(most - count - 1).min(RIGHT - 1)][shape & 7];
-                if c.bit(model, count == right) {
-                    break;
-                }
-                count += 1;
-                at = ring.around(at + 1);
-                shape >>= 1;
-            }
-            if count > most {
-                return None;
-            }
-        } else if ring.closed {
-            return None;
-        }
+        let (ring, m) = (&self.ring, &mut *self.m);
+        let models = (&mut m.left[state.min(2) as usize], &mut m.right);
+        let mean = ring.squares / ring.edges() as f32;
+        let (first, count) = match ring.longer(mean) {
+            Some(longer) => count(c, models, ring, two, want, |k| (longer >> k) as usize),
+            None => count(c, models, ring, two, want, |k| ring.longer_at(mean, k)),
+        }?;
         Some(Cuts { left: ring.left(first), right: ring.right(first, count), first, count })
     }
 
@@ -218,4 +181,42 @@ impl Codec<'_> {
         let (first, count) = self.find(two, Wanted { vertex: v, left, right, code })?;
         Some(Cuts { left: self.ring.left(first), right: self.ring.right(first, count), first, count })
     }
+}
+
+/// The edge of the left cut, and the faces between both, given by edge whether it and those before and behind it are long.
+#[inline(always)]
+fn count<C: Coder>(
+    c: &mut C,
+    (left_models, right_models): (&mut [[Bit; SHAPES]; LEFT], &mut Right),
+    ring: &Ring,
+    two: bool,
+    want: Option<(usize, usize)>,
+    shape: impl Fn(usize) -> usize,
+) -> Option<(usize, usize)> {
+    let (faces, n) = (ring.faces(), ring.edges());
+    let (left, right) = want.unwrap_or_default();
+    // With one face the whole fan may stay.
+    let edges = if two { faces } else { n };
+    let mut first = 0;
+    while first + 1 < edges {
+        let model = &mut left_models[(edges - first - 2).min(LEFT - 1)][shape(first) & 7];
+        if c.bit(model, first == left) {
+            break;
+        }
+        first += 1;
+    }
+    if !two {
+        return (!ring.closed).then_some((first, faces - first));
+    }
+    let most = if ring.closed { faces.checked_sub(1)? } else { faces - first };
+    let mut count = 1;
+    while count < most {
+        let models = &mut right_models[(count - 1).min(DONE - 1)];
+        let model = &mut models[(most - count - 1).min(RIGHT - 1)][shape(first + count) & 7];
+        if c.bit(model, count == right) {
+            break;
+        }
+        count += 1;
+    }
+    (count <= most).then_some((first, count))
 }
