@@ -14,7 +14,7 @@ use self::cuts::Cuts;
 pub(super) use self::cuts::Wanted;
 use self::sweep::NEW;
 use super::base::{MeshHead, Singles};
-use super::coder::{Bit, Coder, Decoder, Encoder, Nibble, Number, put_varint, take_varint};
+use super::coder::{Bit, Choice, Coder, Decoder, Encoder, Nibble, Number, put_varint, take_varint};
 use super::extras::Extras;
 use super::places;
 use super::residual::Residuals;
@@ -52,8 +52,9 @@ struct Models {
     moves: Bit,
     named: [Number; 2],
     inner: [Bit; 3],
-    left: cuts::Left,
-    right: cuts::Right,
+    /// The edge of the left cut, by what the sweep did with the vertex; the faces between both.
+    left: [Choice; 3],
+    right: Choice,
     error: [Nibble; TOPS],
     error_far: Number,
     context: context::Models,

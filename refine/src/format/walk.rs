@@ -76,7 +76,7 @@ pub(super) struct Walk {
 /// An edge of a ring, and what lies at its other end.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edge {
-    /// Where the other end is, seen from the vertex, and the square of its distance.
+    /// Where the other end is, seen from the vertex; and 0, as four are added up as fast as three.
     pub(super) to: [f32; 4],
     /// The half by which the face behind the edge is entered; of an open ring the last has none.
     half: u32,
@@ -95,31 +95,18 @@ pub(super) struct Ring {
     room: Vec<Edge>,
     edges: usize,
     pub(super) closed: bool,
-    /// The squares of all lengths, summed up in turn.
-    pub(super) squares: f32,
-    /// Those of the first edges, side by side: they are compared many at a time.
-    lengths: [f32; FEW],
     /// The most edges that it is to have.
     pub(super) most: usize,
 }
 
 impl Default for Ring {
     fn default() -> Self {
-        Ring {
-            room: vec![Edge::NOWHERE; ROOM],
-            edges: 0,
-            closed: false,
-            squares: 0.0,
-            lengths: [0.0; FEW],
-            most: usize::MAX,
-        }
+        Ring { room: vec![Edge::NOWHERE; ROOM], edges: 0, closed: false, most: usize::MAX }
     }
 }
 
 /// Edges that there is room for at first.
 const ROOM: usize = 32;
-/// Rings of no more edges are looked at as bits of one number.
-const FEW: usize = 31;
 
 /// An edge of a ring as a cut: as a half of the face that goes to the new vertex and of that which stays, as far as they are there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -170,31 +157,6 @@ impl Ring {
         }
     }
 
-    /// Which edges are longer than the square root of `mean`, if they are few: bit k + 1 for edge k, counted once around, with nothing long before or behind the edges of an open ring.
-    #[inline(always)]
-    pub(super) fn longer(&self, mean: f32) -> Option<u64> {
-        let n = self.edges;
-        if n > FEW {
-            return None;
-        }
-        let mut bits = few_longer::<8>(&self.lengths, mean);
-        if n > 8 {
-            bits = few_longer::<FEW>(&self.lengths, mean);
-        }
-        let bits = bits as u64 & ((1 << n) - 1);
-        Some(if self.closed { (bits | bits << n) << 1 | bits >> (n - 1) } else { bits << 1 })
-    }
-
-    /// Whether the edge before edge `k`, which is counted once around, is longer than that, in bit 0, it, and the one behind: as [`Ring::longer`] says of few.
-    #[cold]
-    pub(super) fn longer_at(&self, mean: f32, k: usize) -> usize {
-        let long = |k: usize| (self.room[k].to[3] > mean) as usize;
-        let at = self.around(k);
-        let before =
-            if k > 0 { long(self.around(k - 1)) } else { self.closed as usize & long(self.edges - 1) };
-        before | long(at) << 1 | long(at + 1) << 2
-    }
-
     /// Faces.
     #[inline]
     pub(super) fn faces(&self) -> usize {
@@ -241,12 +203,6 @@ impl Ring {
     pub(super) fn around(&self, k: usize) -> usize {
         if k >= self.edges { k - self.edges } else { k }
     }
-}
-
-/// Of the first `N` squares those that are greater, as bits.
-#[inline(always)]
-fn few_longer<const N: usize>(squares: &[f32; FEW], mean: f32) -> u32 {
-    squares.iter().take(N).zip(0..).fold(0, |bits, (&s, k)| bits | ((s > mean) as u32) << k)
 }
 
 /// A place seen from another.
@@ -428,7 +384,7 @@ impl Walk {
     fn edge(&self, half: u32, far: u32, t: &[f32; 3]) -> Edge {
         let p = &self.vertices[far as usize].place;
         let [x, y, z] = [p[0] - t[0], p[1] - t[1], p[2] - t[2]];
-        Edge { to: [x, y, z, x * x + y * y + z * z], half, far }
+        Edge { to: [x, y, z, 0.0], half, far }
     }
 
     /// The ring of `v` from `start` on; from the border on if there is one. `None` for links that lead astray, as only damage makes them.
@@ -437,15 +393,11 @@ impl Walk {
         let t = self.vertices[v as usize].place;
         let faces = &self.faces[..];
         loop {
-            let (mut entry, mut squares) = (start, 0.0);
+            let mut entry = start;
             for (n, room) in ring.room.iter_mut().enumerate() {
                 let face = &faces[(entry >> 3) as usize];
                 let step = (STEPS >> (8 * (entry & 7))) as usize;
                 *room = self.edge(entry, face[step & 3], &t);
-                squares += room.to[3];
-                if let Some(length) = ring.lengths.get_mut(n) {
-                    *length = room.to[3];
-                }
                 let link = face[step >> 4 & 7];
                 if link == NONE {
                     return self.open(start, (turn(entry), n + 1), &t, ring);
@@ -458,7 +410,7 @@ impl Walk {
                         Some(room) => *room = first,
                         None => ring.room.push(first),
                     }
-                    (ring.closed, ring.edges, ring.squares) = (true, n + 1, squares);
+                    (ring.closed, ring.edges) = (true, n + 1);
                     return Some(());
                 }
             }
@@ -492,9 +444,6 @@ impl Walk {
         let back = room.len() - n;
         room[n..].reverse();
         room.rotate_right(back);
-        ring.squares = 0.0;
-        room.iter().for_each(|e| ring.squares += e.to[3]);
-        ring.lengths.iter_mut().zip(&*room).for_each(|(l, e)| *l = e.to[3]);
         (ring.closed, ring.edges) = (false, room.len());
         // With the room that others have found there.
         room.resize((room.len() + 1).max(ROOM), Edge::NOWHERE);

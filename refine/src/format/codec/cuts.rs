@@ -1,7 +1,7 @@
 //! Where a split opens the ring of its vertex.
 
-use super::super::coder::{Bit, Coder};
-use super::super::walk::{Cut, Ring, cut, turn};
+use super::super::coder::Coder;
+use super::super::walk::{Cut, cut, turn};
 use super::Codec;
 use crate::aif::NONE;
 use crate::progressive::SplitCode;
@@ -15,18 +15,6 @@ const ARRANGEMENT: u16 = 0x3F;
 const TURNED: u32 = 1 << 16;
 /// Beside the code: the cuts are named, not counted.
 const NAMED: u32 = 1 << 17;
-
-/// Edges of a ring still to come that are told apart, for the left cut and for the right one; faces between both.
-const LEFT: usize = 8;
-const RIGHT: usize = 8;
-const DONE: usize = 4;
-/// Which of an edge, the one before and the one behind are long.
-const SHAPES: usize = 8;
-
-/// Whether an edge is the left cut: by what the sweep did with the vertex, edges to come, lengths.
-pub(super) type Left = [[[Bit; SHAPES]; LEFT]; 3];
-/// Whether an edge is the right cut: by faces between, edges to come, lengths.
-pub(super) type Right = [[[Bit; SHAPES]; RIGHT]; DONE];
 
 /// The split that a writer wants, in the numbers of its mesh.
 #[derive(Clone, Copy, Debug)]
@@ -132,7 +120,7 @@ impl Codec<'_> {
         ((1..=most).contains(&count) && named(count)).then_some((first, count))
     }
 
-    /// Cuts by going around the ring, edge by edge. The new vertex is rather where edges are long.
+    /// Cuts by their places in the ring.
     #[inline]
     fn counted<C: Coder>(
         &mut self,
@@ -142,12 +130,17 @@ impl Codec<'_> {
         want: Option<(usize, usize)>,
     ) -> Option<Cuts> {
         let (ring, m) = (&self.ring, &mut *self.m);
-        let models = (&mut m.left[state.min(2) as usize], &mut m.right);
-        let mean = ring.squares / ring.edges() as f32;
-        let (first, count) = match ring.longer(mean) {
-            Some(longer) => count(c, models, ring, two, want, |k| (longer >> k) as usize),
-            None => count(c, models, ring, two, want, |k| ring.longer_at(mean, k)),
-        }?;
+        let (faces, n) = (ring.faces(), ring.edges());
+        let (left, right) = want.unwrap_or_default();
+        // With one face the whole fan may stay.
+        let first = c.choice(&mut m.left[state.min(2) as usize], if two { faces } else { n }, left)?;
+        let mut count = faces - first;
+        if two {
+            let most = if ring.closed { faces.checked_sub(1)? } else { count };
+            count = 1 + c.choice(&mut m.right, most, right.saturating_sub(1))?;
+        } else if ring.closed {
+            return None;
+        }
         Some(Cuts { left: ring.left(first), right: ring.right(first, count), first, count })
     }
 
@@ -181,42 +174,4 @@ impl Codec<'_> {
         let (first, count) = self.find(two, Wanted { vertex: v, left, right, code })?;
         Some(Cuts { left: self.ring.left(first), right: self.ring.right(first, count), first, count })
     }
-}
-
-/// The edge of the left cut, and the faces between both, given by edge whether it and those before and behind it are long.
-#[inline(always)]
-fn count<C: Coder>(
-    c: &mut C,
-    (left_models, right_models): (&mut [[Bit; SHAPES]; LEFT], &mut Right),
-    ring: &Ring,
-    two: bool,
-    want: Option<(usize, usize)>,
-    shape: impl Fn(usize) -> usize,
-) -> Option<(usize, usize)> {
-    let (faces, n) = (ring.faces(), ring.edges());
-    let (left, right) = want.unwrap_or_default();
-    // With one face the whole fan may stay.
-    let edges = if two { faces } else { n };
-    let mut first = 0;
-    while first + 1 < edges {
-        let model = &mut left_models[(edges - first - 2).min(LEFT - 1)][shape(first) & 7];
-        if c.bit(model, first == left) {
-            break;
-        }
-        first += 1;
-    }
-    if !two {
-        return (!ring.closed).then_some((first, faces - first));
-    }
-    let most = if ring.closed { faces.checked_sub(1)? } else { faces - first };
-    let mut count = 1;
-    while count < most {
-        let models = &mut right_models[(count - 1).min(DONE - 1)];
-        let model = &mut models[(most - count - 1).min(RIGHT - 1)][shape(first + count) & 7];
-        if c.bit(model, count == right) {
-            break;
-        }
-        count += 1;
-    }
-    (count <= most).then_some((first, count))
 }
