@@ -1,8 +1,8 @@
 //! The order of the splits in a file, and how it is cut into chunks.
 //!
 //! Bands of error come one after the other; as errors nest along dependencies, that is an order splits may have. A band ends where it has made a given multiple of the
-//! vertices that it began with. Within a band, the vertices alive at its start are
-//! put in the order of their descent (a vertex's descendants side by side), and a chunk takes the splits of a run of them, and those of others that they depend on and that no chunk has
+//! vertices that it began with. Within a band, the splits that descend from one vertex of its start stay together; the region that these vertices are in is cut, and cut again, until there are
+//! compact parts of a chunk each. A chunk takes the splits of its part, and those of others that they depend on and that no chunk has
 //! yet: they are near, and would have to be repeated otherwise. Within a chunk splits come in sweeps over its vertices ([`super::sweep`]).
 
 use super::places;
