@@ -14,7 +14,7 @@ use self::cuts::Cuts;
 pub(super) use self::cuts::Wanted;
 use self::sweep::NEW;
 use super::base::{MeshHead, Singles};
-use super::coder::{Bit, Coder, Decoder, Encoder, Nibble, Number, put_varint, take_varint};
+use super::coder::{Bit, Choice, Coder, Decoder, Encoder, Nibble, Number, put_varint, take_varint};
 use super::extras::Extras;
 use super::places;
 use super::residual::Residuals;
@@ -52,8 +52,9 @@ struct Models {
     moves: Bit,
     named: [Number; 2],
     inner: [Bit; 3],
-    left: cuts::Left,
-    right: cuts::Right,
+    /// The edge of the left cut, by what the sweep did with the vertex; the faces between both.
+    left: [Choice; 3],
+    right: Choice,
     error: [Nibble; TOPS],
     error_far: Number,
     context: context::Models,
@@ -180,10 +181,10 @@ impl<'a> Codec<'a> {
     /// Does a split.
     #[inline]
     fn apply(&mut self, v: u32, cuts: &Cuts, code: SplitCode, made: ([f64; 3], u16)) {
-        let u = self.walk.vertices.len();
+        let u = self.walk.vertices.len() as u32;
+        let made = (made.0, made.1, NEW);
         self.walk.split(v, &self.ring, (cuts.first, cuts.count), [cuts.left, cuts.right], code, made);
-        self.walk.vertices[u].visit = NEW;
-        self.list.extend([v, u as u32]);
+        self.list.extend_from_slice(&[v, u]);
     }
 
     /// A level of error: mostly a little below that of the split before at the vertex.

@@ -6,7 +6,7 @@
 //! Own code, where zstd is at hand: chunks are small (some 10 KB a stream), and most of their symbols are worth a
 //! fraction of a bit in their context (whether a vertex waits, which way a face runs), which a coder of bytes cannot know.
 
-pub(super) use super::models::{Bit, Nibble, Number};
+pub(super) use super::models::{Bit, Choice, Nibble, Number};
 use super::models::{PRECISION, TOTAL};
 
 /// Writes or reads one stream.
@@ -61,8 +61,15 @@ pub(super) trait Coder {
     }
 
     /// A number below 76: as long as it is not below 15, 15 is taken off it.
-    #[inline]
+    #[inline(always)]
     fn length(&mut self, models: &mut [Nibble; 5], value: u32) -> u32 {
+        let [first, others @ ..] = models;
+        let part = self.nibble(first, value.min(15));
+        if part < 15 { part } else { 15 + self.rest_of_length(others, value.saturating_sub(15)) }
+    }
+
+    #[cold]
+    fn rest_of_length(&mut self, models: &mut [Nibble; 4], value: u32) -> u32 {
         let mut done = 0;
         for m in models {
             let part = self.nibble(m, value.saturating_sub(done).min(15));
@@ -72,6 +79,21 @@ pub(super) trait Coder {
             }
         }
         done
+    }
+
+    /// A number below `n`, if there are two; a reader gets no other.
+    #[inline]
+    fn choice(&mut self, m: &mut Choice, n: usize, value: usize) -> Option<usize> {
+        if n <= 1 {
+            return (n == 1).then_some(0);
+        }
+        let value = match self.nibble(&mut m.near[Choice::of(n)], value.min(15) as u32) {
+            15 => usize::try_from(self.number(&mut m.far, (value as u64).saturating_sub(15)))
+                .ok()?
+                .checked_add(15)?,
+            near => near as usize,
+        };
+        (value < n).then_some(value)
     }
 
     /// A number with a sign: zigzag, then as [`Coder::number`].
@@ -332,12 +354,14 @@ mod tests {
         Plain(u32, u32),
         Number(u64),
         Signed(i64),
+        Choice(usize, usize),
     }
 
     fn run<C: Coder>(c: &mut C, items: &[Item]) -> Vec<u64> {
         let mut bits = [Bit::default(); 3];
         let mut nibbles = [Nibble::default(); 2];
         let (mut number, mut signed) = (Number::default(), Number::default());
+        let mut choice = Choice::default();
         items
             .iter()
             .map(|i| match *i {
@@ -346,6 +370,7 @@ mod tests {
                 Item::Plain(n, v) => c.plain(n, v) as u64,
                 Item::Number(v) => c.number(&mut number, v),
                 Item::Signed(v) => c.signed(&mut signed, v) as u64,
+                Item::Choice(n, v) => c.choice(&mut choice, n, v).unwrap() as u64,
             })
             .collect()
     }
@@ -357,6 +382,7 @@ mod tests {
             (0..=32u32, any::<u32>()).prop_map(|(n, v)| Item::Plain(n, (v as u64 & low_mask(n)) as u32)),
             (0..=64u32, any::<u64>()).prop_map(|(n, v)| Item::Number(v & low_mask(n))),
             any::<i64>().prop_map(Item::Signed),
+            (1..40usize, 0..40usize).prop_map(|(n, v)| Item::Choice(n, v % n)),
         ]
     }
 

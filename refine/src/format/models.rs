@@ -73,11 +73,19 @@ pub(super) struct Nibble {
 
 impl Default for Nibble {
     fn default() -> Self {
-        Nibble { start: std::array::from_fn(|i| ((i as u32) << (PRECISION - 4)) as u16 as i16), seen: 0 }
+        Nibble::of(16)
     }
 }
 
 impl Nibble {
+    /// Mostly one of the first `n` symbols, each as likely as the others; no other can be less likely.
+    pub(super) fn of(n: u32) -> Self {
+        let n = n.clamp(1, 16);
+        let each = (TOTAL - 16) / n;
+        let start = |k: u32| if k <= n { k * each + k } else { TOTAL - 16 + k };
+        Nibble { start: std::array::from_fn(|k| start(k as u32) as u16 as i16), seen: 0 }
+    }
+
     /// Start and size of the share of `symbol`.
     #[inline(always)]
     pub(super) fn share(&self, symbol: usize) -> (u32, u32) {
@@ -107,6 +115,30 @@ impl Nibble {
         for (s, goal) in self.start.iter_mut().zip(goals) {
             *s += (goal - *s) >> rate;
         }
+    }
+}
+
+/// So many choices are told apart; the last are more.
+const CHOICES: usize = 17;
+
+/// One of some, by how many there are: an adaptive symbol for each number.
+#[derive(Clone, Debug)]
+pub(super) struct Choice {
+    pub(super) near: [Nibble; CHOICES],
+    pub(super) far: Number,
+}
+
+impl Choice {
+    /// Of so many.
+    #[inline(always)]
+    pub(super) fn of(n: usize) -> usize {
+        n.min(CHOICES - 1)
+    }
+}
+
+impl Default for Choice {
+    fn default() -> Self {
+        Choice { near: std::array::from_fn(|n| Nibble::of(n as u32)), far: Number::default() }
     }
 }
 

@@ -1,8 +1,8 @@
 //! The order of the splits in a file, and how it is cut into chunks.
 //!
 //! Bands of error come one after the other; as errors nest along dependencies, that is an order splits may have. A band ends where it has made a given multiple of the
-//! vertices that it began with. Within a band, the vertices alive at its start are
-//! put in the order of their descent (a vertex's descendants side by side), and a chunk takes the splits of a run of them, and those of others that they depend on and that no chunk has
+//! vertices that it began with. Within a band, the splits that descend from one vertex of its start stay together; the region that these vertices are in is cut, and cut again, until there are
+//! compact parts of a chunk each. A chunk takes the splits of its part, and those of others that they depend on and that no chunk has
 //! yet: they are near, and would have to be repeated otherwise. Within a chunk splits come in sweeps over its vertices ([`super::sweep`]).
 
 use super::places;
@@ -168,25 +168,40 @@ impl Plan {
         let mut plan = Plan::default();
         for band in keys.chunk_by(|&a, &b| bands[a as usize] == bands[b as usize]) {
             let name = bands[band[0] as usize];
-            let mut left = band.iter().filter(|&&i| !schedule.has(i)).count();
-            let subtrees: Vec<&[u32]> =
-                band.chunk_by(|&a, &b| schedule.root(a) == schedule.root(b)).collect();
-            let (mut subtrees, mut subtree) = (subtrees.into_iter(), 0);
-            while left > 0 {
-                let number = plan.pieces.len() as u32;
-                let aim = left.div_ceil(left.div_ceil(layout.chunk));
-                let mut taken = Vec::with_capacity(aim + aim / 8);
-                let (mut own, mut seen) = (0, 0);
-                while own < aim {
-                    let Some(of) = subtrees.next() else { break };
-                    of.iter().for_each(|&i| schedule.take(i, number, &mut taken));
-                    own += taken[seen..].iter().filter(|&&i| bands[i as usize] == name).count();
-                    seen = taken.len();
+            let subtrees: Vec<Subtree<'_>> = band
+                .chunk_by(|&a, &b| schedule.root(a) == schedule.root(b))
+                .map(|splits| {
+                    let v = root[n0 + splits[0] as usize] as usize;
+                    let made = v.checked_sub(n0).map(|i| pm.new_positions.get(i).to_array());
+                    Subtree {
+                        splits,
+                        at: made.unwrap_or_else(|| places::point(&pm.base_positions, v)),
+                        left: 0,
+                    }
+                })
+                .collect();
+            let before = plan.pieces.len();
+            // Regions still to be cut, the next one last.
+            let mut regions = vec![(subtrees, usize::MAX)];
+            while let Some((mut region, parts)) = regions.pop() {
+                region.iter_mut().for_each(|s| {
+                    s.left = s.splits.iter().filter(|&&i| !schedule.has(i)).count();
+                });
+                region.retain(|s| s.left > 0);
+                let left: usize = region.iter().map(|s| s.left).sum();
+                let parts = parts.min(left.div_ceil(layout.chunk));
+                if parts > 1 && region.len() > 1 {
+                    let rest = cut(&mut region, left, parts);
+                    regions.push((rest, parts - parts / 2));
+                    regions.push((region, parts / 2));
+                } else if left > 0 {
+                    let number = plan.pieces.len() as u32;
+                    let mut taken = Vec::with_capacity(left + left / 8);
+                    region.iter().flat_map(|s| s.splits).for_each(|&i| schedule.take(i, number, &mut taken));
+                    schedule.add(&taken, number);
+                    let subtree = (plan.pieces.len() - before) as u32;
+                    plan.pieces.push(Piece { count: taken.len(), band: name, subtree });
                 }
-                left -= own;
-                schedule.add(&taken, number);
-                plan.pieces.push(Piece { count: taken.len(), band: name, subtree });
-                subtree += 1;
             }
         }
         if schedule.order.len() < n {
@@ -196,6 +211,35 @@ impl Plan {
         plan.levels = pm.levels.clone();
         Some(plan)
     }
+}
+
+/// Splits of a band that descend from one vertex of its start, where that is, and how many of them no chunk has yet.
+struct Subtree<'a> {
+    splits: &'a [u32],
+    at: [f64; 3],
+    left: usize,
+}
+
+/// Cuts a region that is to be `parts` chunks across its longest side, and returns what lies behind the cut: both are compact, so that little around them has to be repeated.
+fn cut<'a>(region: &mut Vec<Subtree<'a>>, left: usize, parts: usize) -> Vec<Subtree<'a>> {
+    let side = |axis: usize| {
+        let [low, high] = region
+            .iter()
+            .map(|s| s.at[axis])
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+        high - low
+    };
+    let sides = [side(0), side(1), side(2)];
+    let longest = (0..3).max_by(|&a, &b| sides[a].total_cmp(&sides[b])).unwrap_or(0);
+    region.sort_by(|a, b| a.at[longest].total_cmp(&b.at[longest]));
+    let aim = left / parts * (parts / 2);
+    let mut sum = 0;
+    let until = region.iter().take_while(|s| {
+        sum += s.left;
+        sum <= aim
+    });
+    let at = until.count().clamp(1, region.len() - 1);
+    region.split_off(at)
 }
 
 /// Numbers by a key below `keys`, equals as they were. O(n + keys).

@@ -29,13 +29,8 @@ impl Guess {
     #[inline(always)]
     pub(super) fn lay(&mut self, normal: [f32; 3]) {
         let [x, y, z] = [normal[0].abs(), normal[1].abs(), normal[2].abs()];
-        let last = if x > y && x > z {
-            0
-        } else if y > z {
-            1
-        } else {
-            2
-        };
+        // No branch: it is any of them.
+        let last = (!((x > y) & (x > z)) as usize) * (2 - (y > z) as usize);
         self.axes = ORDERS[last];
         let n = 1.0 / normal[last];
         self.slope = [normal[0] * n, normal[1] * n, normal[2] * n];
@@ -267,11 +262,9 @@ impl<const KINDS: usize> Residuals<KINDS> {
         let error = error.clamp(longest - 24, longest + 2);
         let context = 2 * FLAT + (((rise - error).clamp(-4, 11) + 4) >> 1) as usize;
         let z = self.one(c, scale, (set, context), (last, expected, error), value[last]);
-        match last {
-            0 => [z, x, y],
-            1 => [x, z, y],
-            _ => [x, y, z],
-        }
+        let mut place = [z; 3];
+        (place[a], place[b]) = (x, y);
+        place
     }
 
     /// One coordinate.

@@ -76,7 +76,7 @@ pub(super) struct Walk {
 /// An edge of a ring, and what lies at its other end.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Edge {
-    /// Where the other end is, seen from the vertex, and the square of its distance.
+    /// Where the other end is, seen from the vertex; and 0, as four are added up as fast as three.
     pub(super) to: [f32; 4],
     /// The half by which the face behind the edge is entered; of an open ring the last has none.
     half: u32,
@@ -95,15 +95,13 @@ pub(super) struct Ring {
     room: Vec<Edge>,
     edges: usize,
     pub(super) closed: bool,
-    /// The squares of all lengths, summed up in turn.
-    pub(super) squares: f32,
     /// The most edges that it is to have.
     pub(super) most: usize,
 }
 
 impl Default for Ring {
     fn default() -> Self {
-        Ring { room: vec![Edge::NOWHERE; ROOM], edges: 0, closed: false, squares: 0.0, most: usize::MAX }
+        Ring { room: vec![Edge::NOWHERE; ROOM], edges: 0, closed: false, most: usize::MAX }
     }
 }
 
@@ -121,8 +119,10 @@ impl Cut {
     /// The half in the later-made of its faces, and whether that goes to the new vertex.
     #[inline]
     pub(super) fn name(self) -> (u32, bool) {
-        let inner = self.inner != NONE && (self.outer == NONE || self.outer >> 3 <= self.inner >> 3);
-        (if inner { self.inner } else { self.outer }, inner)
+        let Cut { inner, outer } = self;
+        let is_inner = (inner != NONE) & ((outer == NONE) | (outer >> 3 <= inner >> 3));
+        // No branch: it is the one as often as the other.
+        (outer ^ (inner ^ outer) & (is_inner as u32).wrapping_neg(), is_inner)
     }
 }
 
@@ -133,15 +133,28 @@ impl Ring {
         self.edges
     }
 
-    /// All of them, and what stands behind them.
-    #[inline(always)]
-    pub(super) fn and_next(&self) -> &[Edge] {
-        self.room.get(..self.edges + 1).unwrap_or_default()
-    }
-
+    /// All of them.
     #[inline(always)]
     pub(super) fn all(&self) -> &[Edge] {
         self.room.get(..self.edges).unwrap_or_default()
+    }
+
+    /// Edge `first` and the `count` behind it; those that are counted more than once around only after [`Ring::unroll`].
+    #[inline(always)]
+    pub(super) fn run(&self, first: usize, count: usize) -> &[Edge] {
+        self.room.get(first..=first + count).unwrap_or_default()
+    }
+
+    /// Lets edges of a closed ring up to `last` be counted once around.
+    #[inline(always)]
+    pub(super) fn unroll(&mut self, last: usize) {
+        if self.room.len() <= last {
+            self.room.resize(last + 1, Edge::NOWHERE);
+        }
+        // The first stands behind the last already.
+        for k in self.edges + 1..last + 1 {
+            self.room[k] = self.room[k - self.edges];
+        }
     }
 
     /// Faces.
@@ -371,7 +384,7 @@ impl Walk {
     fn edge(&self, half: u32, far: u32, t: &[f32; 3]) -> Edge {
         let p = &self.vertices[far as usize].place;
         let [x, y, z] = [p[0] - t[0], p[1] - t[1], p[2] - t[2]];
-        Edge { to: [x, y, z, x * x + y * y + z * z], half, far }
+        Edge { to: [x, y, z, 0.0], half, far }
     }
 
     /// The ring of `v` from `start` on; from the border on if there is one. `None` for links that lead astray, as only damage makes them.
@@ -380,12 +393,11 @@ impl Walk {
         let t = self.vertices[v as usize].place;
         let faces = &self.faces[..];
         loop {
-            let (mut entry, mut squares) = (start, 0.0);
+            let mut entry = start;
             for (n, room) in ring.room.iter_mut().enumerate() {
                 let face = &faces[(entry >> 3) as usize];
                 let step = (STEPS >> (8 * (entry & 7))) as usize;
                 *room = self.edge(entry, face[step & 3], &t);
-                squares += room.to[3];
                 let link = face[step >> 4 & 7];
                 if link == NONE {
                     return self.open(start, (turn(entry), n + 1), &t, ring);
@@ -398,7 +410,7 @@ impl Walk {
                         Some(room) => *room = first,
                         None => ring.room.push(first),
                     }
-                    (ring.closed, ring.edges, ring.squares) = (true, n + 1, squares);
+                    (ring.closed, ring.edges) = (true, n + 1);
                     return Some(());
                 }
             }
@@ -432,15 +444,13 @@ impl Walk {
         let back = room.len() - n;
         room[n..].reverse();
         room.rotate_right(back);
-        ring.squares = 0.0;
-        room.iter().for_each(|e| ring.squares += e.to[3]);
         (ring.closed, ring.edges) = (false, room.len());
         // With the room that others have found there.
         room.resize((room.len() + 1).max(ROOM), Edge::NOWHERE);
         Some(())
     }
 
-    /// Does a split of `v`: the `count` faces behind edge `first` of its ring go to the new vertex, which is at `place`; both cuts as the ring has them.
+    /// Does a split of `v`: the `count` faces behind edge `first` of its ring, which is unrolled up to there, go to the new vertex, which is at `place`; both cuts as the ring has them.
     #[inline]
     pub(super) fn split(
         &mut self,
@@ -449,27 +459,34 @@ impl Walk {
         (first, count): (usize, usize),
         [left, right]: [Cut; 2],
         code: SplitCode,
-        (place, level): ([f64; 3], u16),
+        (place, level, visit): ([f64; 3], u16, u8),
     ) {
         let u = self.vertices.len() as u32;
         let two = code.two_faces();
-        let tips = [ring.far(first), if two { ring.far(first + count) } else { NONE }];
-        let mut k = first;
-        for _ in 0..count {
-            let entry = ring.room[k].half;
-            if entry == NONE {
+        let run = ring.run(first, count);
+        let end = |e: Option<&Edge>| e.map_or(NONE, |e| e.far);
+        let tips = [end(run.first()), if two { end(run.last()) } else { NONE }];
+        for e in run.iter().take(count) {
+            if e.half == NONE {
                 break;
             }
-            self.face_mut(entry >> 3)[NEAR[(entry & 7) as usize] as usize & 3] = u;
-            k = ring.around(k + 1);
+            self.face_mut(e.half >> 3)[NEAR[(e.half & 7) as usize] as usize & 3] = u;
         }
         // Both faces are across the edge between old and new vertex.
-        let ends = [code.left().1, code.right().1];
-        let [l, r] = [0, 1].map(|k| (self.faces.len() as u32 + k) << 3 | 1 << 1 | !ends[k as usize] as u32);
+        let ends = [after_tip(code.0), after_tip(code.0 >> 3)];
+        let f = self.faces.len() as u32;
+        let [l, r] = [f << 3 | 1 << 1 | !ends[0] as u32, (f + 1) << 3 | 1 << 1 | !ends[1] as u32];
         let between = if two { r ^ l & 1 } else { NONE };
-        let (old, mut at_u) = self.insert(ends[0], [v, u, tips[0]], left, between);
+        let (face, [old, mut at_u]) = between_cut(f, ends[0], [v, u, tips[0]], left, between);
+        self.faces.push(face);
+        self.link(left.outer, old);
+        self.link(left.inner, at_u);
         if two {
-            at_u = self.insert(ends[1], [v, u, tips[1]], right, l ^ r & 1).1;
+            let (face, [old, new]) = between_cut(f + 1, ends[1], [v, u, tips[1]], right, l ^ r & 1);
+            self.faces.push(face);
+            self.link(right.outer, old);
+            self.link(right.inner, new);
+            at_u = new;
         } else {
             // At the border, by the edge between both.
             at_u = turn(at_u);
@@ -488,7 +505,7 @@ impl Walk {
             exact.push(place);
         }
         let place = seen_from(&self.origin, place);
-        self.vertices.push(Vertex { place, level, valence, visit: 0 });
+        self.vertices.push(Vertex { place, level, valence, visit });
         for tip in tips {
             self.changes(tip);
             if let Some(t) = self.vertices.get_mut(tip as usize) {
@@ -498,32 +515,33 @@ impl Walk {
         }
     }
 
-    /// Appends a face (tip first) into an opening, with the link of its edge between old and new vertex; returns that between the tip and the old one, seen from the old, and that between the tip and
-    /// the new one, seen from that.
-    #[inline(always)]
-    fn insert(&mut self, new_next: bool, [v, u, tip]: [u32; 3], at: Cut, between: u32) -> (u32, u32) {
-        let face = self.faces.len() as u32;
-        let (b, c) = if new_next { (u, v) } else { (v, u) };
-        // Edge 0 ends at corner 1, edge 2 begins at corner 2.
-        let (after, before) = (face << 3, face << 3 | 2 << 1 | 1);
-        let (old, new) = if new_next { (before, after) } else { (after, before) };
-        let (to_after, to_before) = if new_next { (at.inner, at.outer) } else { (at.outer, at.inner) };
-        // Seen from where the face ends the edge.
-        let link = |to: u32, from: u32| if to == NONE { NONE } else { to ^ from & 1 };
-        self.faces.push([tip, b, c, link(to_after, after), between, link(to_before, before)]);
-        if at.outer != NONE {
-            self.link(at.outer, old);
-        }
-        if at.inner != NONE {
-            self.link(at.inner, new);
-        }
-        (old, new)
-    }
-
-    /// Links half `x` to `y`, both seen from the same vertex.
+    /// Links half `x`, if there is one, to `y`, both seen from the same vertex.
     #[inline(always)]
     fn link(&mut self, x: u32, y: u32) {
-        self.face_mut(x >> 3)[LINK[x as usize & 7] as usize] = y ^ x & 1;
+        if x != NONE {
+            self.face_mut(x >> 3)[LINK[x as usize & 7] as usize] = y ^ x & 1;
+        }
+    }
+}
+
+/// Of the three low bits of a code: the new vertex follows the tip.
+#[inline(always)]
+fn after_tip(code: u16) -> bool {
+    0b0011_1000 >> (code & 7) & 1 == 1
+}
+
+/// Face `face` (tip first) in an opening, with the link of its edge between old and new vertex; and the half between the tip and the old one, seen from the old, and that between the tip and
+/// the new one, seen from that.
+#[inline(always)]
+fn between_cut(face: u32, new_next: bool, [v, u, tip]: [u32; 3], at: Cut, between: u32) -> (Face, [u32; 2]) {
+    // Edge 0 ends at corner 1, edge 2 begins at corner 2.
+    let (after, before) = (face << 3, face << 3 | 2 << 1 | 1);
+    // Seen from where the face ends the edge.
+    let link = |to: u32, from: u32| if to == NONE { NONE } else { to ^ from & 1 };
+    if new_next {
+        ([tip, u, v, link(at.inner, after), between, link(at.outer, before)], [before, after])
+    } else {
+        ([tip, v, u, link(at.outer, after), between, link(at.inner, before)], [after, before])
     }
 }
 

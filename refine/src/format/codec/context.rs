@@ -5,7 +5,7 @@
 //! to the rings of the mesh as it is then, this costs no more than it did the first time, and nothing else has to be named.
 
 use super::super::base::{MeshHead, Singles};
-use super::super::coder::{Coder, Nibble, Number, unzigzag, zigzag};
+use super::super::coder::{Bit, Coder, Nibble, Number, unzigzag, zigzag};
 use super::super::places::round_even;
 use super::super::residual::Guess;
 use super::super::splits::{CONNECTIVITY, Counts, PLACES, STREAMS};
@@ -20,7 +20,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(super) struct Models {
     sources: Number,
     count: Number,
-    gap: [Number; 2],
+    /// Whether the split is the one behind the last, by whether that was; if not, how many are between them.
+    next: [Bit; 2],
+    gap: Number,
     /// By how much flatter than long the surroundings are; of the coordinate along which they rise, by how much less they do.
     place: [[Nibble; FLAT]; 2],
     far: Number,
@@ -105,10 +107,7 @@ impl Known {
     pub(super) fn vertex(&self, v: u32) -> u32 {
         match v.checked_sub(self.vertices) {
             None => v,
-            Some(k) => match self.ids.get(k as usize) {
-                Some(&id) => self.vertices + id,
-                None => self.vertices + self.first + (k - self.ids.len() as u32),
-            },
+            Some(k) => self.vertices + behind(&self.ids, k, self.first),
         }
     }
 
@@ -117,13 +116,19 @@ impl Known {
     pub(super) fn cut(&self, cut: u32) -> u32 {
         let face = match (cut >> 2).checked_sub(self.faces) {
             None => cut >> 2,
-            Some(k) => match self.of_face.get(k as usize) {
-                Some(&face) => face,
-                None => self.first_face + (k - self.of_face.len() as u32),
-            },
+            Some(k) => behind(&self.of_face, k, self.first_face),
         };
         face << 2 | cut & 3
     }
+}
+
+/// The `k`-th of `known`; behind those one follows the other, from `first` on. No branch: it is the one as often as the other.
+#[inline(always)]
+fn behind(known: &[u32], k: u32, first: u32) -> u32 {
+    let n = known.len() as u32;
+    let at = known.get(k.min(n.saturating_sub(1)) as usize).copied().unwrap_or_default();
+    let later = ((k >= n) as u32).wrapping_neg();
+    at ^ (at ^ first.wrapping_add(k.wrapping_sub(n))) & later
 }
 
 /// What a writer needs for contexts, and what it knows of that of one chunk.
@@ -297,8 +302,9 @@ impl Codec<'_> {
                 let wanted = sources.as_ref().map(|s| s.wanted(pm, part[k]));
                 let own = sources.as_ref().zip(part.get(k));
                 let gap = own.map_or(0, |(s, &i)| s.name(i) - next);
-                let gap = c[CONNECTIVITY].number(&mut self.m.context.gap[near as usize], gap as u64);
-                near = gap == 0;
+                let m = &mut self.m.context;
+                near = c[CONNECTIVITY].bit(&mut m.next[near as usize], gap == 0);
+                let gap = if near { 0 } else { c[CONNECTIVITY].number(&mut m.gap, gap as u64) };
                 let id = u32::try_from(gap).ok()?.checked_add(next)?;
                 next = id.checked_add(1)?;
                 // Here a writer may number splits otherwise.

@@ -1,6 +1,6 @@
 //! Where a split opens the ring of its vertex.
 
-use super::super::coder::{Bit, Coder};
+use super::super::coder::Coder;
 use super::super::walk::{Cut, cut, turn};
 use super::Codec;
 use crate::aif::NONE;
@@ -15,18 +15,6 @@ const ARRANGEMENT: u16 = 0x3F;
 const TURNED: u32 = 1 << 16;
 /// Beside the code: the cuts are named, not counted.
 const NAMED: u32 = 1 << 17;
-
-/// Edges of a ring still to come that are told apart, for the left cut and for the right one; faces between both.
-const LEFT: usize = 8;
-const RIGHT: usize = 8;
-const DONE: usize = 4;
-/// Which of an edge, the one before and the one behind are long.
-const SHAPES: usize = 8;
-
-/// Whether an edge is the left cut: by what the sweep did with the vertex, edges to come, lengths.
-pub(super) type Left = [[[Bit; SHAPES]; LEFT]; 3];
-/// Whether an edge is the right cut: by faces between, edges to come, lengths.
-pub(super) type Right = [[[Bit; SHAPES]; RIGHT]; DONE];
 
 /// The split that a writer wants, in the numbers of its mesh.
 #[derive(Clone, Copy, Debug)]
@@ -99,11 +87,10 @@ impl Codec<'_> {
         if left == NONE {
             return None;
         }
-        code |=
-            if inner { SplitCode::L_INNER } else { 0 } | if left & 1 == 1 { SplitCode::L_STARTS } else { 0 };
-        if two && cuts.right.name().1 {
-            code |= SplitCode::R_INNER;
-        }
+        let flag = |on: bool, flag: u16| flag & (on as u16).wrapping_neg();
+        code |= flag(inner, SplitCode::L_INNER) | flag(left & 1 == 1, SplitCode::L_STARTS);
+        code |= flag(two & cuts.right.name().1, SplitCode::R_INNER);
+        self.ring.unroll(cuts.first + cuts.count);
         Some((SplitCode(code), cuts))
     }
 
@@ -133,7 +120,7 @@ impl Codec<'_> {
         ((1..=most).contains(&count) && named(count)).then_some((first, count))
     }
 
-    /// Cuts by going around the ring, edge by edge. The new vertex is rather where edges are long.
+    /// Cuts by their places in the ring.
     #[inline]
     fn counted<C: Coder>(
         &mut self,
@@ -142,46 +129,15 @@ impl Codec<'_> {
         two: bool,
         want: Option<(usize, usize)>,
     ) -> Option<Cuts> {
-        let ring = &self.ring;
-        let (faces, n, room) = (ring.faces(), ring.edges(), ring.and_next());
-        let mean = ring.squares / n as f32;
-        let long = |k: usize| (room[k].to[3] > mean) as usize;
+        let (ring, m) = (&self.ring, &mut *self.m);
+        let (faces, n) = (ring.faces(), ring.edges());
         let (left, right) = want.unwrap_or_default();
         // With one face the whole fan may stay.
-        let edges = if two { faces } else { n };
-        let models = &mut self.m.left[state.min(2) as usize];
-        // Whether the edge before and edge `first` are long; the edge behind comes above them.
-        let mut shape = (ring.closed as usize & long(n - 1)) | long(0) << 1;
-        let mut first = 0;
-        while first + 1 < edges {
-            shape |= long(first + 1) << 2;
-            let model = &mut models[(edges - first - 2).min(LEFT - 1)][shape & 7];
-            if c.bit(model, first == left) {
-                break;
-            }
-            first += 1;
-            shape >>= 1;
-        }
+        let first = c.choice(&mut m.left[state.min(2) as usize], if two { faces } else { n }, left)?;
         let mut count = faces - first;
         if two {
             let most = if ring.closed { faces.checked_sub(1)? } else { count };
-            count = 1;
-            let mut at = ring.around(first + 1);
-            shape = long(first) | long(at) << 1;
-            while count < most {
-                shape |= long(at + 1) << 2;
-                let models = &mut self.m.right[(count - 1).min(DONE - 1)];
-                let model = &mut models[(most - count - 1).min(RIGHT - 1)][shape & 7];
-                if c.bit(model, count == right) {
-                    break;
-                }
-                count += 1;
-                at = ring.around(at + 1);
-                shape >>= 1;
-            }
-            if count > most {
-                return None;
-            }
+            count = 1 + c.choice(&mut m.right, most, right.saturating_sub(1))?;
         } else if ring.closed {
             return None;
         }

@@ -9,12 +9,11 @@ impl Codec<'_> {
     #[inline]
     pub(super) fn guess(&self, v: u32, cuts: &Cuts, moves: bool) -> Guess {
         let t = self.walk.place(v);
-        let (ring, room) = (&self.ring, self.ring.all());
+        let run = self.ring.run(cuts.first, cuts.count);
         let (mut sum, mut reach, mut normal) = ([0.0f32; 4], [0.0f32; 4], [0.0f32; 3]);
         let mut last = [0.0f32; 4];
-        let mut k = cuts.first;
-        for _ in 0..=cuts.count {
-            let d = room[k].to;
+        for e in run {
+            let d = e.to;
             for a in 0..4 {
                 sum[a] += d[a];
                 reach[a] = greater(d[a].abs(), reach[a]);
@@ -23,7 +22,6 @@ impl Codec<'_> {
             normal[1] += last[2] * d[0] - last[0] * d[2];
             normal[2] += last[0] * d[1] - last[1] * d[0];
             last = d;
-            k = ring.around(k + 1);
         }
         let n = (cuts.count + 1) as f32;
         // Where both are placed anew the old place is between them: fitted to bunny, horse and igea.
@@ -35,8 +33,8 @@ impl Codec<'_> {
         let level = guess.off(go);
         // Both ends and one between.
         let mut rise = level.abs();
-        for k in [cuts.first, ring.around(cuts.first + cuts.count / 2)] {
-            let [x, y, z, _] = room[k].to;
+        for e in [run.first(), run.get(cuts.count / 2)].into_iter().flatten() {
+            let [x, y, z, _] = e.to;
             rise = greater((guess.off([x, y, z]) - level).abs(), rise);
         }
         rise = greater((guess.off([last[0], last[1], last[2]]) - level).abs(), rise);
