@@ -9,12 +9,17 @@ use progmesh::refine::view::Camera;
 use progmesh::selective::{SelectiveScene, circle};
 use std::time::Instant;
 
-type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 /// Times that each is done; the shortest counts.
 const TIMES: usize = 21;
 
 fn main() -> Result<()> {
+    // Views share long lists out among the threads there are.
+    rayon::ThreadPoolBuilder::new().num_threads(1).build()?.install(run)
+}
+
+fn run() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let file = arguments.next().ok_or("usage: adaptation IN.pm [TAU]")?;
     let tau: f64 = arguments.next().map_or(Ok(1.0), |t| t.parse())?;

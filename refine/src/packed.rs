@@ -119,6 +119,12 @@ impl<'a> Run<'a> {
         self.get(0)
     }
 
+    /// Reads where they begin.
+    #[inline(always)]
+    pub(crate) fn fetch(self) -> u8 {
+        self.of.bytes.get(self.start * self.of.width as usize / 8).copied().unwrap_or(0)
+    }
+
     /// The first `k` of them, or all.
     #[inline]
     pub(crate) fn prefix(self, k: usize) -> Run<'a> {
@@ -188,10 +194,16 @@ impl Ranks {
 
     #[inline]
     pub(crate) fn before(&self, i: u32) -> u32 {
+        self.find(i).1
+    }
+
+    /// Both [`Ranks::get`] and [`Ranks::before`].
+    #[inline(always)]
+    pub(crate) fn find(&self, i: u32) -> (bool, u32) {
         let (word, bit) = (i as usize / 64, i % 64);
         match self.bits.get(word) {
-            Some(bits) => self.before[word] + (bits & ((1 << bit) - 1)).count_ones(),
-            None => i.min(self.set),
+            Some(&bits) => (bits >> bit & 1 != 0, self.before[word] + (bits & ((1 << bit) - 1)).count_ones()),
+            None => (i < self.set, i.min(self.set)),
         }
     }
 
@@ -242,6 +254,7 @@ mod tests {
         for i in 0..300 {
             assert_eq!(r.before(i as u32) as usize, bits[..i].iter().filter(|b| **b).count());
             assert_eq!(r.get(i as u32), bits[i]);
+            assert_eq!(r.find(i as u32), (bits[i], r.before(i as u32)));
         }
         assert!(!r.none() && !r.all());
         for bit in [false, true] {

@@ -30,6 +30,7 @@ mod queue;
 mod refine;
 mod regulator;
 mod sieve;
+mod standoff;
 mod survey;
 mod timed;
 mod timed_rows;
@@ -51,6 +52,7 @@ pub use timed::TimedMorph;
 
 use crate::aif::NONE;
 use crate::hierarchy::Hierarchy;
+use standoff::Standoff;
 use std::sync::Arc;
 
 /// A split that is to be applied, and where its cuts lie, as far as that is known.
@@ -77,6 +79,7 @@ pub struct View {
     /// Bits for walks over what splits depend on; none is set between frames.
     marked: Vec<u64>,
     clock: Clock,
+    standoff: Standoff,
     /// The record at which a limit cut short the last frame's looks.
     resume: u32,
     /// A split that was needed when a limit cut short what it depends on.
@@ -91,6 +94,7 @@ impl View {
         View {
             marked: vec![0; hierarchy.forest.len().div_ceil(64)],
             clock: Clock::new(hierarchy.bounds.diagonal),
+            standoff: Standoff::NONE,
             resume: 0,
             unfinished: None,
             faces_before: front.corners().len(),
@@ -223,6 +227,7 @@ impl View {
         debug_assert!(done.is_ok(), "{done:?}");
         let Ok(record) = done else { return };
         let old = self.front.record_of_vertex(h.mesh().splits.vertex[i as usize]);
+        self.front.records[old as usize].count();
         for r in [record, old] {
             self.front.records[r as usize].due = self.clock.now();
         }
@@ -236,9 +241,11 @@ impl View {
     fn undo(&mut self, i: u32, freed: &mut Vec<u32>) {
         let h = &*self.hierarchy;
         self.front.unsplit(h.mesh(), &h.forest, i);
-        let old = self.front.record_of_vertex(h.mesh().splits.vertex[i as usize]);
+        let v = h.mesh().splits.vertex[i as usize];
+        let old = self.front.record_of_vertex(v);
         let now = self.clock.now();
         self.front.records[old as usize].due = now;
+        self.front.count_back(&h.forest, (v, i), old);
         for d in h.forest.needs.of(i).iter() {
             let r = self.front.record(d) as usize;
             let record = &mut self.front.records[r];

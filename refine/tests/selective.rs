@@ -554,6 +554,85 @@ fn a_coherent_flight_shows_what_looking_at_everything_would() {
     }
 }
 
+/// As `fly --path circle` sees it from one side: the middle in the middle of the picture.
+fn from_side(h: &Hierarchy, side: DVec3, distance: f64) -> Camera {
+    let (centre, size) = h.extent();
+    Camera::new(&CameraParameters {
+        eye: centre + distance * size * side.normalize(),
+        target: centre,
+        up: DVec3::new(0.1, 1.0, 0.2),
+        projection: Projection::Perspective { fov_y_deg: 45.0 },
+        width: 1280,
+        height: 720,
+        near: 1e-3 * size,
+        far: 10.0 * size,
+    })
+    .unwrap()
+}
+
+#[test]
+fn jumps_show_what_looking_at_everything_would() {
+    for (name, rule) in both(&["scan", "terrain", "cad"]) {
+        let h = hierarchy_by(rule, name, 4000);
+        let (mut view, mut random) = (View::new(h.clone()), Random(23));
+        let (mut side, mut changed) = (DVec3::Z, 0);
+        for frame in 0..90 {
+            // From anywhere at one distance, then from nearer and farther; in between it goes on without jumps, so that times run, comes nearer without, or is asked for more.
+            let steady = frame % 6 > 3;
+            let to = |random: &mut Random| DVec3::new(random.unit(), random.unit(), random.unit()) - 0.5;
+            side = if steady { side + 0.05 * to(&mut random) } else { to(&mut random) };
+            let distance = match frame {
+                0..30 => 1.0,
+                30..60 => [1.0, 0.97, 0.9, 1.5, 1.5, 1.49][random.below(6)],
+                _ => 0.95 - 0.01 * (frame % 30) as f64,
+            };
+            let tau = if frame < 50 { 0.5 } else { [0.5, 0.49, 0.4, 0.8][random.below(4)] };
+            let camera = from_side(&h, side, distance);
+            let cull = [Cull::All, Cull::None][frame / 3 % 2];
+            let lens = |p: &DMat4| Lens::new(&h, &camera, p, tau, cull).unwrap();
+            let mut lenses = vec![lens(&DMat4::IDENTITY)];
+            let other = DMat4::from_translation(0.2 * h.extent().1 * DVec3::X);
+            lenses.extend((frame % 20 > 16).then(|| lens(&other)));
+            if frame % 7 == 3 {
+                view.adapt_to_all(&lenses, &Limits { operations: 1 + random.below(60), ..Limits::default() });
+            }
+            let done = view.adapt_to_all(&lenses, &Limits::default());
+            changed += usize::from(done.splits > 0 && done.collapses > 0);
+            let mut fresh = View::new(h.clone());
+            fresh.adapt_to_all(&lenses, &Limits::default());
+            assert!(done.complete && view.applied().eq(fresh.applied()), "{name}: frame {frame}");
+            if frame % 15 == 8 {
+                view.take_changes();
+                assert_sound(&view);
+            }
+        }
+        assert!(changed > if name == "cad" { 8 } else { 30 }, "{name}: {changed}");
+    }
+}
+
+#[test]
+fn a_jump_that_keeps_its_distance_looks_at_little_of_what_it_leaves_as_it_is() {
+    let h = hierarchy("scan", 30_000);
+    let lens = |side, distance| {
+        Lens::new(&h, &from_side(&h, side, distance), &DMat4::IDENTITY, 0.7, Cull::None).unwrap()
+    };
+    // Asked after 64 operations or 512 looks; what an operation leaves is looked at as well, once or twice.
+    let questions = |view: &mut View, lens: &Lens| {
+        let asked = std::cell::Cell::new(0);
+        let expired = || asked.replace(asked.get() + 1) < 0;
+        let done = view.adapt(lens, &Limits { expired: Some(&expired), ..Limits::default() });
+        assert!(done.complete);
+        (asked.get() as usize * 512).saturating_sub(10 * (done.splits + done.collapses))
+    };
+    let mut view = View::new(h.clone());
+    view.adapt(&lens(DVec3::Z, 1.0), &Limits::default());
+    let shown = view.vertex_count();
+    assert!(shown > 3000, "{shown}");
+    let jump = questions(&mut view, &lens(DVec3::new(0.7, 0.0, 1.0), 1.0));
+    let nearer = questions(&mut view, &lens(DVec3::Z, 0.9));
+    assert!(2 * jump < shown && 10 * nearer > 9 * shown, "{jump} and {nearer} of {shown}");
+}
+
 #[test]
 fn at_the_limit_of_faces_the_worst_is_shown_and_frames_are_short() {
     let h = hierarchy("scan", 6000);

@@ -85,6 +85,12 @@ impl Forest {
         self.chains.run(self.starts.run(v))
     }
 
+    /// Reads what tells the chain of vertex `v`.
+    #[inline(always)]
+    pub(crate) fn fetch_chain(&self, v: u32) -> u32 {
+        self.starts.fetch(v)
+    }
+
     /// The chain of a vertex that is never split.
     #[inline]
     pub(crate) fn no_chain(&self) -> Run<'_> {
@@ -223,6 +229,12 @@ impl Forest {
             Positions::F32(all) => all.push(place.as_vec3().to_array()),
             Positions::F64(all) => all.push(place.to_array()),
         }
+    }
+
+    /// Whether split `i` moves its vertex, and then where that goes among [`ProgressiveMesh::moved_positions`].
+    #[inline(always)]
+    pub(crate) fn moved(&self, i: u32) -> (bool, u32) {
+        self.moves.find(i)
     }
 
     /// Bytes held.

@@ -67,6 +67,12 @@ impl Offsets {
         start..start + (lengths >> (4 * k) & 15) as usize
     }
 
+    /// Reads what tells run `i`.
+    #[inline(always)]
+    pub(crate) fn fetch(&self, i: u32) -> u32 {
+        self.blocks.get(i as usize / EACH).map_or(0, |b| b.start)
+    }
+
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
         size_of::<Block>() * self.blocks.capacity() + 4 * (EACH + 1) * self.long.capacity()

@@ -46,21 +46,27 @@ impl Rows {
     #[inline]
     pub(crate) fn of(&self, pm: &ProgressiveMesh, i: u32) -> SplitRows {
         let k = i as usize;
+        let (first, count) = (k - k % EACH, (k % EACH) as u16);
         let mut at = self.marks[k / EACH];
-        let codes = &pm.splits.code[k - k % EACH..k];
-        // Mostly none has an entry of its own: then it is sums.
-        let (mut wedges, mut rows, mut plain) = (0, 0, true);
-        for &code in codes {
-            let new = code.kind_code() + 1;
-            wedges += new;
-            rows += new << code.changes_rows() as u32;
-            plain &= new <= 2;
+        // Mostly none has an entry of its own: then it is sums, of all sixteen at once.
+        let (mut wedges, mut rows, mut plain) = (0u16, 0u16, false);
+        if let Some(codes) = pm.splits.code[first..].first_chunk::<EACH>() {
+            let mut kinds = 0;
+            for (j, code) in (0..EACH as u16).zip(codes) {
+                let before = if j < count { u16::MAX } else { 0 };
+                let kind = code.kind_code() as u16 & before;
+                let new = (kind + 1) & before;
+                wedges += new;
+                rows += if code.changes_rows() { 2 * new } else { new };
+                kinds |= kind;
+            }
+            plain = kinds <= 1;
         }
         if plain {
-            (at.wedge, at.row) = (at.wedge + wedges, at.row + rows);
+            (at.wedge, at.row) = (at.wedge + u32::from(wedges), at.row + u32::from(rows));
         } else {
             let explicit = pm.wedges.as_ref().map_or(&[][..], |w| &w.explicit);
-            codes.iter().for_each(|&code| at.pass(code, explicit));
+            pm.splits.code[first..k].iter().for_each(|&code| at.pass(code, explicit));
         }
         at
     }

@@ -2,7 +2,7 @@
 
 use crate::aif::Positions;
 use crate::packed::{Packed, Ranks};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// Points of one precision. [`Places::pack`] lets those that are multiples of a power of two, as methods put them on a grid ([`crate::simplify::Options::grid`]), take as many
 /// bits as their numbers on it need; whatever the points are, each comes back bit for bit.
@@ -87,6 +87,17 @@ impl Places {
         match &self.0 {
             Kept::Plain(p) => p.get(i),
             Kept::Packed(p) => p.get(i),
+        }
+    }
+
+    /// Tells points `which`, each with how many of these come before it. What kind of points there are is asked once.
+    #[inline(always)]
+    pub(crate) fn each(&self, which: &[u32], mut tell: impl FnMut(usize, DVec3)) {
+        let which = which.iter().map(|&i| i as usize).enumerate();
+        match &self.0 {
+            Kept::Plain(Positions::F32(p)) => which.for_each(|(k, i)| tell(k, Vec3::from(p[i]).as_dvec3())),
+            Kept::Plain(Positions::F64(p)) => which.for_each(|(k, i)| tell(k, p[i].into())),
+            Kept::Packed(p) => which.for_each(|(k, i)| tell(k, p.at(i))),
         }
     }
 
@@ -228,8 +239,14 @@ impl OnGrid {
 
     #[inline]
     fn get(&self, i: usize) -> DVec3 {
+        self.at(i)
+    }
+
+    #[inline(always)]
+    fn at(&self, i: usize) -> DVec3 {
         assert!(i < self.len, "point {i} of {}", self.len);
-        let before = self.on.before(i as u32) as usize;
+        let (on_grid, before) = self.on.find(i as u32);
+        let before = before as usize;
         let code = self.numbers.get(before);
         let axis = |shift: u32, mask: u32| ((code >> shift) as u32 & mask) as i32;
         let [x, y, z] = [
@@ -241,7 +258,7 @@ impl OnGrid {
         let on = glam::IVec3::new(x, y, z).as_dvec3() * self.cell + self.least;
         // Both are read, as which it is can not be foretold: there is one more of each.
         let other = self.others.get(i - before);
-        DVec3::select(glam::BVec3::splat(self.on.get(i as u32)), on, other)
+        DVec3::select(glam::BVec3::splat(on_grid), on, other)
     }
 }
 
@@ -255,6 +272,18 @@ mod tests {
             && p.is_f64() == q.is_f64()
             && (0..q.len())
                 .all(|i| p.get(i).to_array().map(f64::to_bits) == q.get(i).to_array().map(f64::to_bits))
+            && {
+                let which: Vec<u32> = (0..q.len() as u32).rev().step_by(3).collect();
+                let mut told = 0;
+                let mut alike = true;
+                p.each(&which, |k, at| {
+                    let as_got = p.get(which[k] as usize);
+                    alike &=
+                        k == told && at.to_array().map(f64::to_bits) == as_got.to_array().map(f64::to_bits);
+                    told += 1;
+                });
+                alike && told == which.len()
+            }
     }
 
     #[test]

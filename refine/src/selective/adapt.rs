@@ -3,7 +3,7 @@
 use super::clock::{Clock, Judges};
 use super::entry::Entry;
 use super::refine::Open;
-use super::survey::LOT;
+use super::survey::{Asked, LOT};
 use super::{Lens, Split, View};
 use std::borrow::Cow;
 
@@ -57,6 +57,16 @@ impl std::ops::AddAssign for Done {
         self.complete &= other.complete;
         self.refused += other.refused;
     }
+}
+
+/// What stands of all that was decided before.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stands {
+    /// What is not due.
+    All,
+    /// Of that, what is too fine as long as lenses keep their distance.
+    TooFine,
+    Nothing,
 }
 
 /// Operations between two questions for the time.
@@ -117,7 +127,15 @@ impl View {
     pub fn adapt_to_all(&mut self, lenses: &[Lens], limits: &Limits<'_>) -> Done {
         let mut meter = Meter::new(limits);
         let judges = Judges::new(lenses, limits.hysteresis);
-        let stands = self.clock.go_on(&judges);
+        let nearer = self.standoff.follow(lenses);
+        let stands = match self.clock.go_on(&judges) {
+            true => Stands::All,
+            false if nearer => Stands::Nothing,
+            false => Stands::TooFine,
+        };
+        if nearer {
+            self.front.look_at_what_was_too_fine(self.clock.now());
+        }
         // First what a limit cut short: else coarsening would undo what is only there for the rest of it, frame after frame.
         if let Some(i) = self.unfinished.take()
             && !self.front.is_applied(i)
@@ -126,7 +144,7 @@ impl View {
             self.apply_with_all(&Split::new(i), &mut meter, &mut Vec::new());
         }
         // With what has just come.
-        let due = self.take_due(!stands);
+        let due = self.take_due(stands);
         self.resume = 0;
         let needed = self.coarsen(&judges, &mut meter, due);
         if !meter.over {
@@ -137,18 +155,33 @@ impl View {
         meter.done
     }
 
-    /// The records that are due, from where the last frame was cut short; all of them if nothing stands. Until they have been looked at they stay due.
-    fn take_due(&mut self, all: bool) -> Vec<u32> {
+    /// The records that are due, from where the last frame was cut short. Until they have been looked at they stay due.
+    fn take_due(&mut self, stands: Stands) -> Vec<u32> {
+        let mut due = match stands {
+            Stands::All => self.come(),
+            Stands::TooFine => {
+                self.front.relied = true;
+                self.all_but(|too_fine| too_fine)
+            }
+            Stands::Nothing => self.all_but(|_| 0),
+        };
+        let from = due.partition_point(|&r| r < self.resume);
+        due.rotate_left(from);
+        due
+    }
+
+    /// The records whose times have come.
+    fn come(&mut self) -> Vec<u32> {
         let (now, late) = (self.clock.now(), self.clock.late());
         let mut due = Vec::new();
         let mut first = 0;
         for block in self.front.records.chunks_mut(16) {
             // Most are not: asked without a branch for each.
-            if all || block.iter().fold(false, |any, r| any | Clock::has_come(now, r.due)) {
+            if block.iter().fold(false, |any, r| any | Clock::has_come(now, r.due)) {
                 for (k, r) in (first..).zip(block.iter_mut()) {
                     if r.is_free() {
                         r.due = late;
-                    } else if all || Clock::has_come(now, r.due) {
+                    } else if Clock::has_come(now, r.due) {
                         r.due = now;
                         due.push(k);
                     }
@@ -156,8 +189,26 @@ impl View {
             }
             first += 16;
         }
-        let from = due.partition_point(|&r| r < self.resume);
-        due.rotate_left(from);
+        due
+    }
+
+    /// All records, but for those of 64 whose bits `stay` gives, if their times have not come; times tell nothing of those any more, and are set as late as can be.
+    fn all_but(&mut self, stay: impl Fn(u64) -> u64) -> Vec<u32> {
+        let now = self.clock.now();
+        let mut due = vec![0; self.front.records.len()];
+        let (mut first, mut n) = (0, 0);
+        for (block, &too_fine) in self.front.records.chunks_mut(64).zip(&self.front.too_fine) {
+            let stay = stay(too_fine);
+            for (k, r) in (0u32..).zip(block.iter_mut()) {
+                // Written whether it is or not, as a branch could not be foreseen.
+                due[n] = first + k;
+                let rest = r.is_free() | (stay >> k & 1 != 0) & !Clock::has_come(now, r.due);
+                n += usize::from(!rest);
+                r.due = if rest { self.clock.at_last(first + k) } else { now };
+            }
+            first += 64;
+        }
+        due.truncate(n);
         due
     }
 
@@ -180,8 +231,10 @@ impl View {
             };
             let survey = self.survey(&there, judges);
             meter.looks += survey.looks;
-            for (&r, &slack) in there.iter().zip(&survey.slack).filter(|s| *s.1 >= 0.0) {
+            let found = survey.slack.iter().zip(&survey.too_fine);
+            for (&r, (&slack, &too_fine)) in there.iter().zip(found).filter(|s| *s.1.0 >= 0.0) {
                 self.front.records[r as usize].due = self.clock.due(f64::from(slack), r);
+                self.front.set_too_fine(r, too_fine);
             }
             self.undo_all(survey.unneeded, judges, meter);
             if meter.over {
@@ -195,8 +248,12 @@ impl View {
 
     /// Undoes splits that can be undone and are not needed, and what becomes free by that and is not needed either.
     fn undo_all(&mut self, mut unneeded: Vec<u32>, judges: &Judges<'_>, meter: &mut Meter<'_>) {
+        if unneeded.is_empty() {
+            return;
+        }
         let last = judges.last(&self.clock);
-        let (mut freed, mut entries, mut kept) = (Vec::new(), Vec::new(), Vec::new());
+        let hierarchy = self.hierarchy.clone();
+        let (mut freed, mut asked) = (Vec::new(), Asked::new(&hierarchy));
         while !unneeded.is_empty() {
             for lot in unneeded.chunks(LOT) {
                 self.fetch_made(lot);
@@ -211,13 +268,7 @@ impl View {
             }
             unneeded.clear();
             meter.looks += freed.len();
-            for lot in freed.chunks(LOT) {
-                entries.clear();
-                kept.clear();
-                entries.extend(lot.iter().map(|&i| Entry::of(&self.hierarchy, i)));
-                last.wanted(&entries, &mut kept);
-                unneeded.extend(lot.iter().zip(&kept).filter(|k| !k.1).map(|k| *k.0));
-            }
+            asked.unneeded(&freed, &last, &mut unneeded);
             freed.clear();
         }
     }

@@ -85,6 +85,12 @@ const SAFE: f64 = 0.999;
 /// Cones and spheres are decided about to such a part of the distance.
 const ROUNDING: f64 = 1e-7;
 
+/// The most steps ahead that are set for what has this `salt`.
+#[inline]
+fn most_ahead(salt: u32) -> u16 {
+    AHEAD - (salt.wrapping_mul(0x9e37_79b1) >> 18) as u16
+}
+
 impl Pace {
     pub(super) fn of(lens: &Lens, diagonal: f64, per_tau: f64) -> Pace {
         let outside = !lens.perspective || lens.eye.length() > 0.5 * diagonal;
@@ -213,10 +219,16 @@ impl Clock {
     /// When a decision that has this slack now is due; what is so late that time does not reach so far comes at times that differ by `salt`, or all would come at once.
     #[inline]
     pub(crate) fn due(&self, slack: f64, salt: u32) -> u16 {
-        let most = AHEAD - (salt.wrapping_mul(0x9e37_79b1) >> 18) as u16;
+        let most = most_ahead(salt);
         let steps = slack * self.steps;
         // NaN is 0.
         self.now.wrapping_add(if steps >= most as f64 { most } else { steps as u16 })
+    }
+
+    /// The same of a decision that stands however far lenses move.
+    #[inline]
+    pub(crate) fn at_last(&self, salt: u32) -> u16 {
+        self.now.wrapping_add(most_ahead(salt))
     }
 
     /// What never is, unless it is made so: it still must be looked at now and then, before the time comes round.
@@ -585,6 +597,7 @@ pub(super) mod tests {
         assert!(Clock::has_come(now, due) && Clock::has_come(now.wrapping_add(30_000), due));
         clock.now = now;
         assert_eq!((clock.due(f64::INFINITY, 0), clock.due(f64::NAN, 5)), (clock.late(), now));
+        assert!((0..100).all(|k| clock.at_last(k) == clock.due(f64::INFINITY, k)));
         let spread: Vec<u16> = (0..100).map(|k| clock.late().wrapping_sub(clock.due(1e9, k))).collect();
         assert!(spread.iter().all(|&s| s < 1 << 14) && spread.iter().any(|&s| s > 1 << 13));
     }

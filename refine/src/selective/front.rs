@@ -19,9 +19,13 @@ pub(crate) struct Front {
     pub(super) base_vertices: u32,
     base_faces: u32,
     pub(super) records: Vec<Record>,
+    /// A bit for each, and more: what comes next there is too fine as long as lenses keep their distance, and nothing else is to be decided. Of records that are due it means nothing.
+    pub(super) too_fine: Vec<u64>,
+    /// Times of such records were set by that alone.
+    pub(super) relied: bool,
     /// The splits that are applied, and where they have their records.
     pub(super) index: Index,
-    /// The first record that is free, which tells the next; [`LAST`] for none.
+    /// The first record that is free, without those of the base, which tells the next; [`LAST`] for none.
     pub(super) free: u32,
     wedge_vertex: Vec<u32>,
     /// The row of every wedge, among those in the mesh.
@@ -35,25 +39,55 @@ pub(crate) struct Front {
 }
 
 /// A vertex that is there.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Record {
-    /// The split that made it; [`NONE`] of the base's. Of a record that is free the next, and [`FREE`].
-    pub(super) made: u32,
+    /// From below: the split that made it, [`LAST`] of the base's, or of one that is free the next of these; how many splits of its vertex are applied, [`SOME`] if they are not counted; and [`FREE`].
+    word: u32,
     /// Applied splits that depend on that split.
     pub(super) dependents: u16,
     /// When to look at it again: see [`super::Clock`].
     pub(super) due: u16,
 }
 
-/// Set in what free records say that they were made by: splits are fewer.
+/// A record that holds no vertex.
 const FREE: u32 = 1 << 31;
-/// The end of the free records.
-pub(super) const LAST: u32 = FREE - 2;
+/// Where the number of applied splits begins.
+const COUNT: u32 = 29;
+/// So many splits of a vertex, or more.
+const SOME: u32 = 3;
+/// No split, and the end of the free records: as a face takes three bits of a link beside its number, splits are fewer.
+pub(super) const LAST: u32 = (1 << COUNT) - 1;
 
 impl Record {
     #[inline]
     pub(super) fn is_free(self) -> bool {
-        self.made & FREE != 0 && self.made != NONE
+        self.word & FREE != 0
+    }
+
+    /// The split that made the vertex; of the base's more than any is.
+    #[inline]
+    pub(super) fn made(self) -> u32 {
+        self.word & LAST
+    }
+
+    /// How many splits of the vertex are applied, if they are few. [`super::View`] counts them.
+    #[inline]
+    pub(super) fn turns(self) -> Option<u32> {
+        Some(self.word >> COUNT & SOME).filter(|&n| n < SOME)
+    }
+
+    /// A split of the vertex has been applied.
+    #[inline]
+    pub(super) fn count(&mut self) {
+        let more = self.turns().is_some();
+        self.word += u32::from(more) << COUNT;
+    }
+
+    /// The last split of the vertex that was applied has been undone. `few` says if those that are left are fewer than are counted up to.
+    #[inline]
+    pub(super) fn count_back(&mut self, few: impl FnOnce() -> bool) {
+        let less = self.turns().is_some() || few();
+        self.word -= u32::from(less) << COUNT;
     }
 }
 
@@ -87,7 +121,9 @@ impl Front {
             fans: Fans { corners: pm.base_faces.clone(), links },
             base_vertices: n0 as u32,
             base_faces: m0 as u32,
-            records: vec![Record { made: NONE, dependents: 0, due: 0 }; n0],
+            records: vec![Record { word: LAST, dependents: 0, due: 0 }; n0],
+            too_fine: vec![0; n0.div_ceil(64)],
+            relied: false,
             index: Index::new(n),
             free: LAST,
             wedge_vertex,
@@ -126,10 +162,25 @@ impl Front {
         self.index.find(i)
     }
 
+    /// How many splits of a record's vertex are applied, given its chain, and which comes next; [`NONE`] if none does.
+    #[inline(always)]
+    pub(super) fn next_of_record(&self, record: Record, chain: Run<'_>) -> (usize, u32) {
+        match record.turns() {
+            Some(n) => (n as usize, chain.get(n as usize).unwrap_or(NONE)),
+            None => self.next_of(chain),
+        }
+    }
+
+    /// Split `i` of a vertex with this record has been undone, the last of its chain that was applied.
+    #[inline]
+    pub(super) fn count_back(&mut self, forest: &Forest, (v, i): (u32, u32), record: u32) {
+        self.records[record as usize].count_back(|| forest.chain(v).get(SOME as usize - 1) == Some(i));
+    }
+
     /// The vertex of a record that is not free.
     #[inline]
     pub(super) fn vertex_of_record(&self, r: u32) -> u32 {
-        if r < self.base_vertices { r } else { self.base_vertices + self.records[r as usize].made }
+        if r < self.base_vertices { r } else { self.base_vertices + self.records[r as usize].made() }
     }
 
     /// The first slot of a record of a split.
@@ -149,10 +200,10 @@ impl Front {
     pub(crate) fn face_in(&self, forest: &Forest, slot: u32) -> u32 {
         let Some(k) = slot.checked_sub(self.base_faces) else { return slot };
         let Some(record) = self.records.get((self.base_vertices + k / 2) as usize) else { return NONE };
-        if record.is_free() || (k % 2 == 1 && !forest.two_faces(record.made)) {
+        if record.is_free() || (k % 2 == 1 && !forest.two_faces(record.made())) {
             return NONE;
         }
-        forest.first_face(record.made) + k % 2
+        forest.first_face(record.made()) + k % 2
     }
 
     /// The slot of face `f`; [`NONE`] if it is not in the mesh.
@@ -393,7 +444,7 @@ impl Front {
     /// A record for split `i`, with two slots.
     #[inline]
     fn take_record(&mut self, i: u32) -> u32 {
-        let new = Record { made: i, dependents: 0, due: 0 };
+        let new = Record { word: i, dependents: 0, due: 0 };
         let r = if self.free == LAST {
             self.fans.corners.extend([[0; 3]; 2]);
             self.fans.links.extend([[NONE; 3]; 2]);
@@ -401,10 +452,11 @@ impl Front {
             self.touched.resize(slots.div_ceil(64) as usize, 0);
             (slots - 2..slots).for_each(|slot| self.touch(slot));
             self.records.push(new);
+            self.too_fine.resize(self.records.len().div_ceil(64), 0);
             self.records.len() as u32 - 1
         } else {
-            let r = self.free;
-            self.free = self.records[r as usize].made & !FREE;
+            let r = self.base_vertices + self.free;
+            self.free = self.records[r as usize].made();
             self.records[r as usize] = new;
             r
         };
@@ -415,8 +467,25 @@ impl Front {
     #[inline]
     fn leave_record(&mut self, r: u32, i: u32) {
         self.index.remove(i);
-        self.records[r as usize].made = FREE | self.free;
-        self.free = r;
+        self.records[r as usize].word = FREE | self.free;
+        self.free = r - self.base_vertices;
+    }
+
+    /// Notes of a record that has been looked at whether what comes next is too fine, and that is all.
+    #[inline]
+    pub(super) fn set_too_fine(&mut self, r: u32, is: bool) {
+        let word = &mut self.too_fine[r as usize / 64];
+        *word = *word & !(1 << (r % 64)) | u64::from(is) << (r % 64);
+    }
+
+    /// Lenses have come nearer: what was too fine need not be any more, and is due where its time was set by that.
+    pub(super) fn look_at_what_was_too_fine(&mut self, now: u16) {
+        if std::mem::take(&mut self.relied) {
+            for (block, &bits) in self.records.chunks_mut(64).zip(&self.too_fine) {
+                (0..).zip(block).filter(|(k, _)| bits >> k & 1 != 0).for_each(|(_, r)| r.due = now);
+            }
+        }
+        self.too_fine.fill(0);
     }
 
     /// Bytes that grow with the mesh shown, and bytes that each view takes for the whole mesh.
@@ -424,6 +493,7 @@ impl Front {
         let (index, blocks) = self.index.bytes();
         let shown = 12 * (self.fans.corners.capacity() + self.fans.links.capacity())
             + size_of::<Record>() * self.records.capacity()
+            + 8 * self.too_fine.capacity()
             + index
             + 8 * self.touched.capacity()
             + 4 * self.touched_wedges.capacity();

@@ -16,6 +16,12 @@ fn settle<T>(v: &mut Vec<T>) {
     }
 }
 
+fn reserve<T>(v: &mut Vec<T>, more: usize) {
+    if v.capacity() - v.len() < more {
+        v.reserve_exact(more + (v.len() + more) / 32 + SPARE / 2);
+    }
+}
+
 impl Front {
     /// Gives back what is not needed: so a front takes as much as what is there, whatever was there before.
     pub(super) fn settle(&mut self) {
@@ -31,6 +37,16 @@ impl Front {
         self.index.settle();
     }
 
+    /// Makes room for so many vertices more, all at once, and no more than may be left when they are there.
+    pub(super) fn reserve(&mut self, vertices: usize) {
+        let free =
+            self.records.len() - self.base_vertices as usize - (self.vertices - self.base_vertices as usize);
+        let more = vertices.saturating_sub(free);
+        reserve(&mut self.records, more);
+        reserve(&mut self.fans.corners, 2 * more);
+        reserve(&mut self.fans.links, 2 * more);
+    }
+
     /// Moves the records from `end` on, as many as there are free ones before it, into these.
     fn pack(&mut self, end: usize) {
         let (before, after) = self.records.split_at(end);
@@ -42,6 +58,7 @@ impl Front {
             self.relocate(from, to);
         }
         self.records.truncate(end);
+        self.too_fine.truncate(end.div_ceil(64));
         self.free = super::front::LAST;
         let slots = self.first_slot(end as u32) as usize;
         self.fans.corners.truncate(slots);
@@ -56,7 +73,8 @@ impl Front {
     fn relocate(&mut self, from: u32, to: u32) {
         let record = self.records[from as usize];
         self.records[to as usize] = record;
-        self.index.replace(record.made, to);
+        self.set_too_fine(to, self.too_fine[from as usize / 64] >> (from % 64) & 1 != 0);
+        self.index.replace(record.made(), to);
         let (old, new) = (self.first_slot(from), self.first_slot(to));
         let own: Range<u32> = old..old + 2;
         for k in 0..2 {

@@ -139,6 +139,8 @@ impl View {
     fn apply_marked(&mut self, words: Range<usize>) -> usize {
         let mut lot = Vec::with_capacity(LOT);
         let mut all = 0;
+        let marked = self.marked.get(words.clone()).unwrap_or_default();
+        self.front.reserve(marked.iter().map(|w| w.count_ones() as usize).sum());
         for word in words {
             let mut bits = std::mem::take(&mut self.marked[word]);
             while bits != 0 {
