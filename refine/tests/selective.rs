@@ -611,29 +611,6 @@ fn jumps_show_what_looking_at_everything_would() {
 }
 
 #[test]
-fn a_jump_that_keeps_its_distance_looks_at_little_of_what_it_leaves_as_it_is() {
-    let h = hierarchy("scan", 30_000);
-    let lens = |side, distance| {
-        Lens::new(&h, &from_side(&h, side, distance), &DMat4::IDENTITY, 0.7, Cull::None).unwrap()
-    };
-    // Asked after 64 operations or 512 looks; what an operation leaves is looked at as well, once or twice.
-    let questions = |view: &mut View, lens: &Lens| {
-        let asked = std::cell::Cell::new(0);
-        let expired = || asked.replace(asked.get() + 1) < 0;
-        let done = view.adapt(lens, &Limits { expired: Some(&expired), ..Limits::default() });
-        assert!(done.complete);
-        (asked.get() as usize * 512).saturating_sub(10 * (done.splits + done.collapses))
-    };
-    let mut view = View::new(h.clone());
-    view.adapt(&lens(DVec3::Z, 1.0), &Limits::default());
-    let shown = view.vertex_count();
-    assert!(shown > 3000, "{shown}");
-    let jump = questions(&mut view, &lens(DVec3::new(0.7, 0.0, 1.0), 1.0));
-    let nearer = questions(&mut view, &lens(DVec3::Z, 0.9));
-    assert!(2 * jump < shown && 10 * nearer > 9 * shown, "{jump} and {nearer} of {shown}");
-}
-
-#[test]
 fn at_the_limit_of_faces_the_worst_is_shown_and_frames_are_short() {
     let h = hierarchy("scan", 6000);
     let c = camera(&h, &mut Random(5), 0.7, true);

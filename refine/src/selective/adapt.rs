@@ -273,3 +273,71 @@ impl View {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aif::{BuildOptions, Mesh, MeshInput, Positions};
+    use crate::hierarchy::{Hierarchy, Options};
+    use crate::progressive::build;
+    use crate::selective::Cull;
+    use crate::simplify::{Options as Simplify, Quiet};
+    use crate::view::{Camera, CameraParameters, Projection};
+    use glam::{DMat4, DVec3};
+    use progmesh_meshes::{GenerateOptions, generate};
+    use std::sync::Arc;
+
+    #[test]
+    fn after_a_jump_that_keeps_its_distance_most_is_not_looked_at() {
+        let s = generate("scan", &GenerateOptions::default().with_faces(4000)).unwrap();
+        let input = MeshInput {
+            positions: Positions::from_f64(s.positions),
+            face_sizes: s.face_sizes,
+            corners: s.corners,
+            ..Default::default()
+        };
+        let mesh = Mesh::build(input, &BuildOptions::default()).unwrap().0;
+        let pm = build(mesh, &Simplify::default(), &Quiet).unwrap().mesh;
+        let h = Arc::new(Hierarchy::new(Arc::new(pm), &Options::default()).unwrap());
+        let (centre, size) = h.extent();
+        let lens = |side: DVec3, distance: f64| {
+            let camera = Camera::new(&CameraParameters {
+                eye: centre + distance * size * side,
+                target: centre,
+                up: DVec3::Y,
+                projection: Projection::Perspective { fov_y_deg: 45.0 },
+                width: 1280,
+                height: 720,
+                near: 1e-3 * size,
+                far: 10.0 * size,
+            });
+            Lens::new(&h, &camera.unwrap(), &DMat4::IDENTITY, 3.0, Cull::All).unwrap()
+        };
+        let mut view = View::new(h.clone());
+        // Twice, as what a frame makes the next one looks at.
+        for _ in 0..2 {
+            assert!(view.adapt(&lens(DVec3::Z, 1.0), &Limits::default()).complete);
+        }
+        let due = |view: &View, lens: Lens| {
+            let mut view = view.clone();
+            let nearer = view.standoff.follow(&[lens]);
+            assert!(!view.clock.go_on(&Judges::new(&[lens], 1.0)));
+            view.take_due(if nearer { Stands::Nothing } else { Stands::TooFine }).len()
+        };
+        let shown = view.vertex_count();
+        let (kept, nearer) = (due(&view, lens(DVec3::X, 1.0)), due(&view, lens(DVec3::X, 0.96)));
+        assert!(
+            shown > 300 && kept > 0 && 2 * kept < shown && nearer == shown,
+            "{kept}, {nearer} of {shown}"
+        );
+        // Then nearer: those that were left are looked at, though it is no jump.
+        for _ in 0..2 {
+            assert!(view.adapt(&lens(DVec3::X, 1.0), &Limits::default()).complete && view.front.relied);
+        }
+        let near = lens(DVec3::X, 0.95);
+        assert!(view.standoff.follow(&[near]) && view.clock.go_on(&Judges::new(&[near], 1.0)));
+        let before = view.come().len();
+        view.front.look_at_what_was_too_fine(view.clock.now());
+        assert!(before + view.vertex_count() / 3 < view.come().len() && !view.front.relied, "{before}");
+    }
+}
