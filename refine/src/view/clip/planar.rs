@@ -148,13 +148,7 @@ impl Polygon {
     /// True if `p` is inside of `cycles`, by the way from it to the middle of an edge of theirs; `None` if that way meets a vertex.
     ///
     /// A point and one just left of an edge are on the same side of the boundary if an even number of edges is between them.
-    fn is_inside(
-        &self,
-        p: DVec3,
-        a: u32,
-        b: u32,
-        cycles: impl Iterator<Item = (u32, u32)>,
-    ) -> Option<bool> {
+    fn is_inside(&self, p: DVec3, a: u32, b: u32, cycles: impl Iterator<Item = (u32, u32)>) -> Option<bool> {
         let at = |i: u32| self.points[i as usize];
         let m = at(a).try_normalize()? + at(b).try_normalize()?;
         let left = det3(at(a), at(b), p);
