@@ -1,92 +1,209 @@
 //! Splits that could be made or undone next, and when to look at them: the times apart, as most frames look at few of many.
+//!
+//! Entries keep their places, and places are used again: so what is taken out moves no other, whose page would have to be told. Few frames ask all times. From time to time all are, for those that
+//! may come before a *horizon*, some frames like the last from now; until lenses have passed that, frames ask these alone.
 
-use crate::selective::{Clocks, Due, Entry};
+use crate::aif::NONE;
+use crate::selective::{Clocks, Due, Entry, Sums};
 
 /// A split that may come next, or may be undone next.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Open {
     pub(super) entry: Entry,
-    /// The node it replaces.
+    /// The node it replaces; [`NONE`] of a free place, whose split is the next one that is free.
     pub(super) node: u32,
 }
 
+/// Asking one of those before the horizon takes as long as asking so many in their order.
+const ASK: usize = 3;
+/// Frames to the horizon, at most.
+const FRAMES: f64 = 16.0;
+
 /// A list without order.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct List {
     of: Vec<Open>,
+    /// Free places are never due.
     due: Vec<Due>,
+    /// The first free place.
+    free: u32,
+    /// Places that may be due before the horizon, each once.
+    soon: Vec<u32>,
+    /// Which those are, a bit a place.
+    is_soon: Vec<u64>,
+    horizon: Option<Sums>,
+    /// Places that are due in this frame; some may have been taken out since.
+    ready: Vec<u32>,
+}
+
+impl Default for List {
+    fn default() -> Self {
+        List {
+            of: Vec::new(),
+            due: Vec::new(),
+            free: NONE,
+            soon: Vec::new(),
+            is_soon: Vec::new(),
+            horizon: None,
+            ready: Vec::new(),
+        }
+    }
 }
 
 impl List {
-    /// Bytes of an entry.
-    pub(super) const ENTRY: usize = size_of::<Open>() + size_of::<Due>();
+    /// Bytes of an entry, rounded up.
+    pub(super) const ENTRY: usize = size_of::<Open>() + size_of::<Due>() + 2 * size_of::<u32>() + 1;
 
-    pub(super) fn len(&self) -> usize {
-        self.of.len()
-    }
-
-    /// Of both arrays the lesser.
+    /// Of all arrays the least.
     pub(super) fn capacity(&self) -> usize {
-        self.of.capacity().min(self.due.capacity())
+        let places = self.soon.capacity().min(self.ready.capacity()).min(64 * self.is_soon.capacity());
+        self.of.capacity().min(self.due.capacity()).min(places)
     }
 
     pub(super) fn bytes(&self) -> usize {
-        size_of::<Open>() * self.of.capacity() + size_of::<Due>() * self.due.capacity()
+        size_of::<Open>() * self.of.capacity()
+            + size_of::<Due>() * self.due.capacity()
+            + 4 * (self.soon.capacity() + self.ready.capacity())
+            + 8 * self.is_soon.capacity()
     }
 
     /// Room for so many in all.
     pub(super) fn reserve_to(&mut self, to: usize) {
-        self.of.reserve_exact(to.saturating_sub(self.of.len()));
-        self.due.reserve_exact(to.saturating_sub(self.due.len()));
-    }
-
-    #[inline]
-    pub(super) fn get(&self, at: usize) -> Option<&Open> {
-        self.of.get(at)
-    }
-
-    /// The last ones, so many if there are.
-    pub(super) fn tail(&self, most: usize) -> &[Open] {
-        &self.of[self.of.len() - most.min(self.of.len())..]
-    }
-
-    #[inline]
-    pub(super) fn push(&mut self, open: Open, due: Due) {
-        self.of.push(open);
-        self.due.push(due);
-    }
-
-    /// Takes out entry `at`, which there is; returns the one that is there now, if any.
-    #[inline]
-    pub(super) fn take_out(&mut self, at: usize) -> Option<Open> {
-        self.of.swap_remove(at);
-        self.due.swap_remove(at);
-        self.of.get(at).copied()
-    }
-
-    #[inline]
-    pub(super) fn set_due(&mut self, at: usize, due: Due) {
-        if let Some(d) = self.due.get_mut(at) {
-            *d = due;
+        fn grow<T>(v: &mut Vec<T>, to: usize) {
+            v.reserve_exact(to.saturating_sub(v.len()));
         }
+        grow(&mut self.of, to);
+        grow(&mut self.due, to);
+        grow(&mut self.soon, to);
+        grow(&mut self.is_soon, to.div_ceil(64));
+        grow(&mut self.ready, to);
     }
 
-    /// The place behind the next entry that is due (`all`: any), downwards from `at`; 0 if none is.
+    /// What is in a place.
     #[inline]
-    pub(super) fn next_due(&self, at: usize, all: bool, clock: &Clocks) -> usize {
-        let at = at.min(self.due.len());
-        if all {
-            return at;
-        }
-        let (due, sums) = (&self.due[..at], clock.sums());
-        // Most are not: asked without a branch for each.
-        let (rest, blocks) = due.as_rchunks::<16>();
-        for (k, block) in blocks.iter().enumerate().rev() {
-            if block.iter().fold(false, |any, &d| any | sums.have_reached(d)) {
-                let last = block.iter().rposition(|&d| sums.have_reached(d));
-                return last.map_or(0, |j| rest.len() + 16 * k + j + 1);
+    pub(super) fn get(&self, at: u32) -> Option<&Open> {
+        self.of.get(at as usize).filter(|o| o.node != NONE)
+    }
+
+    /// Adds an entry that is to be looked at at once; returns its place.
+    #[inline]
+    pub(super) fn push(&mut self, open: Open) -> u32 {
+        let at = self.free;
+        match self.of.get_mut(at as usize) {
+            Some(place) => {
+                self.free = place.entry.split;
+                *place = open;
+                self.set_due(at, Due::NOW);
+                at
+            }
+            None => {
+                let at = self.of.len() as u32;
+                self.of.push(open);
+                self.due.push(Due::NEVER);
+                self.is_soon.resize(self.of.len().div_ceil(64), 0);
+                self.set_due(at, Due::NOW);
+                at
             }
         }
-        rest.iter().rposition(|&d| sums.have_reached(d)).map_or(0, |k| k + 1)
+    }
+
+    /// Takes out what is in a place.
+    #[inline]
+    pub(super) fn take_out(&mut self, at: u32) {
+        if let Some(o) = self.of.get_mut(at as usize).filter(|o| o.node != NONE) {
+            (o.node, o.entry.split) = (NONE, self.free);
+            self.due[at as usize] = Due::NEVER;
+            self.free = at;
+        }
+    }
+
+    #[inline]
+    pub(super) fn set_due(&mut self, at: u32, due: Due) {
+        let Some(d) = self.due.get_mut(at as usize) else { return };
+        *d = due;
+        if self.horizon.is_some_and(|h| h.have_reached(due)) {
+            let (word, bit) = (&mut self.is_soon[at as usize / 64], 1 << (at % 64));
+            if *word & bit == 0 {
+                *word |= bit;
+                self.soon.push(at);
+            }
+        }
+    }
+
+    /// Begins a frame: finds the places that are due; `all`: those of all entries. Returns how many there are.
+    pub(super) fn begin(&mut self, all: bool, clock: &Clocks) -> usize {
+        let now = clock.sums();
+        if all {
+            self.forget();
+            self.ready.clear();
+            let there = (0..).zip(&self.due).filter(|(_, d)| **d != Due::NEVER).map(|(at, _)| at);
+            self.ready.extend(there);
+            return self.ready.len();
+        }
+        match self.horizon.filter(|h| h.include(now)) {
+            Some(h) => self.ask_soon(now, h),
+            None => {
+                // Where asking all, shared by the frames to the horizon, takes as long as asking those that come before it.
+                let frames = self.of.len() as f64 / (ASK * self.ready.len().max(1)) as f64;
+                self.forget();
+                let horizon = clock.horizon(frames.sqrt().clamp(1.0, FRAMES));
+                self.ask_all(now, horizon);
+                self.horizon = Some(horizon);
+            }
+        }
+        self.ready.len()
+    }
+
+    fn forget(&mut self) {
+        self.horizon = None;
+        self.soon.clear();
+        self.is_soon.fill(0);
+    }
+
+    /// Most do not come before the horizon: asked without a branch for each.
+    fn ask_all(&mut self, now: Sums, horizon: Sums) {
+        self.ready.clear();
+        let mut first = 0;
+        for block in self.due.chunks(16) {
+            if block.iter().fold(false, |any, &d| any | horizon.have_reached(d)) {
+                for (at, &d) in (first..).zip(block) {
+                    if now.have_reached(d) {
+                        self.ready.push(at);
+                    } else if horizon.have_reached(d) {
+                        self.is_soon[at as usize / 64] |= 1 << (at % 64);
+                        self.soon.push(at);
+                    }
+                }
+            }
+            first += 16;
+        }
+    }
+
+    fn ask_soon(&mut self, now: Sums, horizon: Sums) {
+        self.ready.clear();
+        let mut kept = 0;
+        for k in 0..self.soon.len() {
+            let at = self.soon[k];
+            let due = self.due[at as usize];
+            // What is looked at is told when to be looked at again.
+            let (is_due, stays) = (now.have_reached(due), horizon.have_reached(due));
+            self.soon[kept] = at;
+            if stays && !is_due {
+                kept += 1;
+            } else {
+                self.is_soon[at as usize / 64] &= !(1 << (at % 64));
+            }
+            if is_due {
+                self.ready.push(at);
+            }
+        }
+        self.soon.truncate(kept);
+    }
+
+    /// Place `k` of those that are due, and what is there; `None` if it was taken out.
+    #[inline]
+    pub(super) fn ready(&self, k: usize) -> Option<(u32, &Entry)> {
+        let at = *self.ready.get(k)?;
+        self.get(at).map(|o| (at, &o.entry))
     }
 }
