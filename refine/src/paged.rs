@@ -69,7 +69,7 @@ pub enum PagedError {
 
 /// A mesh of a file between base and full detail, finer where a view needs it, whose parts are read when they are needed.
 ///
-/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 105 B for a split of a resident page by the ring rule, 90 by that of cuts, and 200 B for a vertex shown.
+/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 105 B for a split of a resident page by the ring rule, 90 by that of cuts, and 220 B for a vertex shown.
 #[derive(Debug)]
 pub struct PagedView<S> {
     shelf: Shelf<S>,

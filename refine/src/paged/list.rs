@@ -14,8 +14,6 @@ pub(super) struct Open {
     pub(super) node: u32,
 }
 
-/// Asking one of those before the horizon takes as long as asking so many in their order.
-const ASK: usize = 3;
 /// Frames to the horizon, at most.
 const FRAMES: f64 = 16.0;
 
@@ -27,10 +25,8 @@ pub(super) struct List {
     due: Vec<Due>,
     /// The first free place.
     free: u32,
-    /// Places that may be due before the horizon, each once.
-    soon: Vec<u32>,
-    /// Which those are, a bit a place.
-    is_soon: Vec<u64>,
+    /// Places that are due before the horizon, and when. What has been told otherwise since is still there, and left out when it comes.
+    soon: Vec<(u32, Due)>,
     horizon: Option<Sums>,
     /// Places that are due in this frame; some may have been taken out since.
     ready: Vec<u32>,
@@ -43,7 +39,6 @@ impl Default for List {
             due: Vec::new(),
             free: NONE,
             soon: Vec::new(),
-            is_soon: Vec::new(),
             horizon: None,
             ready: Vec::new(),
         }
@@ -51,20 +46,21 @@ impl Default for List {
 }
 
 impl List {
-    /// Bytes of an entry, rounded up.
-    pub(super) const ENTRY: usize = size_of::<Open>() + size_of::<Due>() + 2 * size_of::<u32>() + 1;
+    /// Bytes of an entry.
+    pub(super) const ENTRY: usize =
+        size_of::<Open>() + size_of::<Due>() + size_of::<(u32, Due)>() + size_of::<u32>();
 
     /// Of all arrays the least.
     pub(super) fn capacity(&self) -> usize {
-        let places = self.soon.capacity().min(self.ready.capacity()).min(64 * self.is_soon.capacity());
-        self.of.capacity().min(self.due.capacity()).min(places)
+        let lists = self.soon.capacity().min(self.ready.capacity());
+        self.of.capacity().min(self.due.capacity()).min(lists)
     }
 
     pub(super) fn bytes(&self) -> usize {
         size_of::<Open>() * self.of.capacity()
             + size_of::<Due>() * self.due.capacity()
-            + 4 * (self.soon.capacity() + self.ready.capacity())
-            + 8 * self.is_soon.capacity()
+            + size_of::<(u32, Due)>() * self.soon.capacity()
+            + size_of::<u32>() * self.ready.capacity()
     }
 
     /// Room for so many in all.
@@ -75,7 +71,6 @@ impl List {
         grow(&mut self.of, to);
         grow(&mut self.due, to);
         grow(&mut self.soon, to);
-        grow(&mut self.is_soon, to.div_ceil(64));
         grow(&mut self.ready, to);
     }
 
@@ -100,7 +95,6 @@ impl List {
                 let at = self.of.len() as u32;
                 self.of.push(open);
                 self.due.push(Due::NEVER);
-                self.is_soon.resize(self.of.len().div_ceil(64), 0);
                 self.set_due(at, Due::NOW);
                 at
             }
@@ -122,10 +116,11 @@ impl List {
         let Some(d) = self.due.get_mut(at as usize) else { return };
         *d = due;
         if self.horizon.is_some_and(|h| h.have_reached(due)) {
-            let (word, bit) = (&mut self.is_soon[at as usize / 64], 1 << (at % 64));
-            if *word & bit == 0 {
-                *word |= bit;
-                self.soon.push(at);
+            // More than there is room for: then all are asked again.
+            if self.soon.len() >= self.soon.capacity().min(self.ready.capacity()) {
+                self.forget();
+            } else {
+                self.soon.push((at, due));
             }
         }
     }
@@ -141,10 +136,10 @@ impl List {
             return self.ready.len();
         }
         match self.horizon.filter(|h| h.include(now)) {
-            Some(h) => self.ask_soon(now, h),
+            Some(_) => self.ask_soon(now),
             None => {
-                // Where asking all, shared by the frames to the horizon, takes as long as asking those that come before it.
-                let frames = self.of.len() as f64 / (ASK * self.ready.len().max(1)) as f64;
+                // So many that asking all, shared by the frames to the horizon, takes as long as asking those that come before it.
+                let frames = self.of.len() as f64 / self.ready.len().max(1) as f64;
                 self.forget();
                 let horizon = clock.horizon(frames.sqrt().clamp(1.0, FRAMES));
                 self.ask_all(now, horizon);
@@ -157,7 +152,6 @@ impl List {
     fn forget(&mut self) {
         self.horizon = None;
         self.soon.clear();
-        self.is_soon.fill(0);
     }
 
     /// Most do not come before the horizon: asked without a branch for each.
@@ -170,8 +164,7 @@ impl List {
                     if now.have_reached(d) {
                         self.ready.push(at);
                     } else if horizon.have_reached(d) {
-                        self.is_soon[at as usize / 64] |= 1 << (at % 64);
-                        self.soon.push(at);
+                        self.soon.push((at, d));
                     }
                 }
             }
@@ -179,25 +172,17 @@ impl List {
         }
     }
 
-    fn ask_soon(&mut self, now: Sums, horizon: Sums) {
+    fn ask_soon(&mut self, now: Sums) {
         self.ready.clear();
-        let mut kept = 0;
-        for k in 0..self.soon.len() {
-            let at = self.soon[k];
-            let due = self.due[at as usize];
-            // What is looked at is told when to be looked at again.
-            let (is_due, stays) = (now.have_reached(due), horizon.have_reached(due));
-            self.soon[kept] = at;
-            if stays && !is_due {
-                kept += 1;
-            } else {
-                self.is_soon[at as usize / 64] &= !(1 << (at % 64));
+        let (due, ready) = (&self.due, &mut self.ready);
+        self.soon.retain(|&(at, told)| {
+            let is_due = now.have_reached(told);
+            // It may have been told otherwise, or be of another entry, since.
+            if is_due && due.get(at as usize) == Some(&told) {
+                ready.push(at);
             }
-            if is_due {
-                self.ready.push(at);
-            }
-        }
-        self.soon.truncate(kept);
+            !is_due
+        });
     }
 
     /// Place `k` of those that are due, and what is there; `None` if it was taken out.
