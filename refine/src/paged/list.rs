@@ -192,3 +192,84 @@ impl List {
         self.get(at).map(|o| (at, &o.entry))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hierarchy::{Packed, pack_up};
+    use crate::selective::{Cull, Judges, Lens, Looked};
+    use crate::view::{Camera, CameraParameters, Projection};
+    use glam::{DMat4, DVec3};
+    use std::collections::{BTreeMap, BTreeSet};
+
+    fn entry(split: u32, at: DVec3) -> Entry {
+        let packed = Packed { error: pack_up(0.002), radius: pack_up(0.01), ..Packed::default() };
+        Entry::new(split, at.as_vec3(), packed)
+    }
+
+    /// On a flight that goes faster, stands and turns, while entries come and go, what is found to be due is what is when all are asked.
+    #[test]
+    fn what_is_due_is_found() {
+        let mut state = 7u64;
+        let mut unit = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as f64 / (1u64 << 31) as f64
+        };
+        let mut vector = move || DVec3::new(unit(), unit(), 0.1 * unit()) - DVec3::new(0.5, 0.5, 0.0);
+        let (mut clock, mut list) = (Clocks::new(1.4), List::default());
+        list.reserve_to(600);
+        // When each place was told to be due.
+        let mut told: BTreeMap<u32, Due> = BTreeMap::new();
+        let (mut eye, mut angle, mut splits) = (DVec3::new(-0.4, 0.0, 0.05), 0.0f64, 0);
+        let (mut found_soon, mut all_found) = (0, 0);
+        for frame in 0..300 {
+            let speed = [0.0, 1e-4, 1e-3, 4e-3][frame / 10 % 4];
+            angle += [0.0, 0.0, 2e-3][frame / 7 % 3];
+            let look = DVec3::new(angle.cos(), angle.sin(), -0.1);
+            eye += speed * look;
+            let camera = Camera::new(&CameraParameters {
+                eye,
+                target: eye + look,
+                up: DVec3::Z,
+                projection: Projection::Perspective { fov_y_deg: 50.0 },
+                width: 800,
+                height: 600,
+                near: 1e-3,
+                far: 20.0,
+            });
+            let lens = Lens::about(DVec3::ZERO, &camera.unwrap(), &DMat4::IDENTITY, 1.0, Cull::Frustum);
+            let lens = [lens.unwrap()];
+            let judges = Judges::new(&lens, 1.0);
+            let stands = clock.go_on(&judges);
+            let soon = list.horizon.is_some_and(|h| h.include(clock.sums()));
+            let count = list.begin(!stands, &clock);
+            let found: BTreeSet<u32> = (0..count).filter_map(|k| list.ready(k)).map(|r| r.0).collect();
+            let due = |d: &Due| !stands || clock.sums().have_reached(*d);
+            let expected: BTreeSet<u32> = told.iter().filter(|t| due(t.1)).map(|t| *t.0).collect();
+            assert_eq!(found, expected, "frame {frame}");
+            if soon && stands {
+                found_soon += found.len();
+            }
+            all_found += found.len();
+            let asked: Vec<Entry> = found.iter().map(|&p| list.get(p).unwrap().entry).collect();
+            let mut looked = Looked::default();
+            clock.look(&clock.next(&judges), &asked, &mut looked);
+            for (&place, (_, due)) in found.iter().zip(looked.each()) {
+                list.set_due(place, due);
+                told.insert(place, due);
+            }
+            let gone: Vec<u32> = told.keys().copied().filter(|p| (p + frame as u32) % 97 == 0).collect();
+            for p in gone {
+                list.take_out(p);
+                told.remove(&p);
+            }
+            while told.len() < 500 {
+                let place = list.push(Open { entry: entry(splits, vector()), node: splits });
+                assert_eq!(list.get(place).map(|o| o.node), Some(splits));
+                assert!(told.insert(place, Due::NOW).is_none() && place < 500);
+                splits += 1;
+            }
+        }
+        assert!(found_soon > 1000 && all_found < 300 * 250, "{found_soon} of {all_found}");
+    }
+}
