@@ -34,9 +34,9 @@ use crate::aif::NONE;
 use crate::format::{ByteRanges, FormatError, RangeReader};
 use crate::hierarchy::Rule;
 use crate::progressive::{Damage, Fans};
-use crate::selective::{Clocks, Cull, Due, Entry, Followed, Lens, LensError, Motions};
+use crate::selective::{Clocks, Cull, Entry, Followed, Lens, LensError, Motions};
 use crate::view::Camera;
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DVec3, Vec3};
 use list::{List, Open};
 use shelf::Shelf;
 use std::sync::Arc;
@@ -69,7 +69,7 @@ pub enum PagedError {
 
 /// A mesh of a file between base and full detail, finer where a view needs it, whose parts are read when they are needed.
 ///
-/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 105 B for a split of a resident page by the ring rule, 90 by that of cuts, and 200 B for a vertex shown.
+/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 105 B for a split of a resident page by the ring rule, 90 by that of cuts, and 220 B for a vertex shown.
 #[derive(Debug)]
 pub struct PagedView<S> {
     shelf: Shelf<S>,
@@ -160,7 +160,8 @@ impl<S: ByteRanges> PagedView<S> {
             return Err(PagedError::Memory { limit, needed });
         }
         for v in 0..vertices as u32 {
-            view.offer(v)?;
+            let centre = view.shelf.local_centre(v)?;
+            view.offer(v, centre);
         }
         Ok(view)
     }
@@ -353,55 +354,61 @@ impl<S: ByteRanges> PagedView<S> {
         true
     }
 
-    /// Node `k` is in the mesh now: what replaces it can be applied.
-    fn offer(&mut self, k: u32) -> Result<(), PagedError> {
+    /// Node `k` is in the mesh now, and stands at `centre`, about the origin of the bounds: what replaces it can be applied.
+    fn offer(&mut self, k: u32, centre: Vec3) {
         let (next, bounds) = self.shelf.continuation(k);
-        if next == NONE {
-            return Ok(());
+        if next != NONE {
+            self.put_open(k, Entry::new(next, centre, bounds));
         }
-        let entry = Entry::new(next, self.shelf.local_centre(k)?, bounds);
-        self.shelf.set_open_place(k, self.open.len() as u32);
-        self.open.push(Open { entry, node: k }, Due::NOW);
-        Ok(())
+    }
+
+    fn put_open(&mut self, node: u32, entry: Entry) {
+        let at = self.open.push(Open { entry, node });
+        self.shelf.set_open_place(node, at);
+    }
+
+    /// What replaces node `k`, which is in the mesh.
+    fn open_at(&self, k: u32) -> Option<Entry> {
+        self.open.get(self.shelf.open_place(k)).filter(|o| o.node == k).map(|o| o.entry)
     }
 
     /// Node `k` is not in the mesh any more, or was replaced.
     fn withdraw(&mut self, k: u32) {
-        let at = self.shelf.open_place(k) as usize;
-        if self.open.get(at).is_none_or(|o| o.node != k) {
-            return;
-        }
-        self.shelf.set_open_place(k, NONE);
-        if let Some(moved) = self.open.take_out(at) {
-            self.shelf.set_open_place(moved.node, at as u32);
+        let at = self.shelf.open_place(k);
+        if self.open.get(at).is_some_and(|o| o.node == k) {
+            self.shelf.set_open_place(k, NONE);
+            self.open.take_out(at);
         }
     }
 
     /// Split `i`, which is applied, can be undone.
     fn free_split(&mut self, i: u32) -> Result<(), PagedError> {
-        let Some((node, _)) = self.shelf.parent(i) else { return Ok(()) };
-        if self.shelf.last_place(i) != NONE {
-            return Ok(());
-        }
-        let (next, bounds) = self.shelf.continuation(node);
-        if next != i {
-            return Err(Damage::Fan(i as usize).into());
-        }
-        let entry = Entry::new(i, self.shelf.local_centre(node)?, bounds);
-        self.shelf.set_last_place(i, self.last.len() as u32);
-        self.last.push(Open { entry, node }, Due::NOW);
+        let Some(r) = self.shelf.record(i).filter(|r| r.last_place == NONE) else { return Ok(()) };
+        let (node, vertex, bounds) = (r.parent, r.vertex, r.bounds);
+        // Where nothing moves, its vertex stands where it always does.
+        let centre = match self.shelf.moves {
+            true => self.shelf.local_centre(node)?,
+            false => self.shelf.local_place(vertex)?,
+        };
+        self.put_last(node, Entry::new(i, centre, bounds));
         Ok(())
     }
 
+    fn put_last(&mut self, node: u32, entry: Entry) {
+        let at = self.last.push(Open { entry, node });
+        self.shelf.set_last_place(entry.split, at);
+    }
+
+    /// Split `i`, if it can be undone.
+    fn last_at(&self, i: u32) -> Option<Entry> {
+        self.last.get(self.shelf.last_place(i)).map(|o| o.entry).filter(|e| e.split == i)
+    }
+
     fn hold_split(&mut self, i: u32) {
-        let at = self.shelf.last_place(i) as usize;
-        if self.last.get(at).is_none_or(|o| o.entry.split != i) {
-            return;
-        }
-        self.shelf.set_last_place(i, NONE);
-        if let Some(moved) = self.last.take_out(at) {
-            let split = moved.entry.split;
-            self.shelf.set_last_place(split, at as u32);
+        let at = self.shelf.last_place(i);
+        if self.last.get(at).is_some_and(|o| o.entry.split == i) {
+            self.shelf.set_last_place(i, NONE);
+            self.last.take_out(at);
         }
     }
 }

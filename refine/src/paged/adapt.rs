@@ -168,26 +168,29 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// Undoes what is not needed, until nothing is left that could be. A lot at a time is looked at, and undone.
     fn coarsen(&mut self, desk: &mut Desk<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
-        let (mut at, whole) = start(self.resume[0], self.last.len());
+        let (mut at, whole) = start(self.resume[0], self.last.begin(all, &self.clock));
         let mut freed = Vec::new();
-        let mut lot = Vec::with_capacity(LOT);
-        loop {
-            // Undoing takes out of the list: what comes to a place that is yet to come is looked at again if it is due.
-            let from = at;
-            at = self.take_due(Which::Last, at, all, desk, frame);
-            if desk.places.is_empty() {
-                break;
-            }
+        let mut lot = Vec::with_capacity(2 * LOT);
+        let mut from = at;
+        while at > 0 && !frame.meter.over {
+            at = self.take_due(Which::Last, at, desk, frame);
             self.sift(desk, &mut lot);
+            // Few of those looked at are undone: when they are a lot, memory is waited for together.
+            if lot.len() < LOT && at > 0 {
+                continue;
+            }
             self.undo_lot(&lot, &mut freed, frame)?;
-            // A lot at a time, the rest at the end.
+            // The rest at the end.
             while freed.len() >= LOT && !frame.meter.over {
                 self.undo_freed(desk, &mut freed, &mut lot, frame)?;
             }
-            if frame.meter.over {
-                at = from;
-                break;
+            if !frame.meter.over {
+                from = at;
             }
+            lot.clear();
+        }
+        if frame.meter.over {
+            at = from;
         }
         while !freed.is_empty() && !frame.meter.over {
             self.undo_freed(desk, &mut freed, &mut lot, frame)?;
@@ -204,8 +207,10 @@ impl<S: ByteRanges> PagedView<S> {
         freed: &mut Vec<u32>,
         frame: &mut Frame<'_>,
     ) -> Result<(), PagedError> {
-        self.ready_to_undo(lot);
-        for &i in lot {
+        for (k, &i) in lot.iter().enumerate() {
+            if k % LOT == 0 {
+                self.ready_to_undo(&lot[k..lot.len().min(k + LOT)]);
+            }
             if !frame.meter.goes_on() {
                 return Ok(());
             }
@@ -232,73 +237,66 @@ impl<S: ByteRanges> PagedView<S> {
         for &i in &freed[part..] {
             let place = self.shelf.last_place(i);
             // It may have come in twice.
-            if let Some(o) = self.last.get(place as usize).filter(|o| o.entry.split == i) {
+            if let Some(o) = self.last.get(place).filter(|o| o.entry.split == i) {
                 desk.put(place, &o.entry);
             }
         }
         freed.truncate(part);
         frame.meter.looks += desk.places.len();
+        lot.clear();
         self.sift(desk, lot);
         self.undo_lot(lot, freed, frame)
     }
 
-    /// Looks at those on the desk, which could be undone: into `lot` goes what is not needed, of the others is noted when they are due.
+    /// Looks at those on the desk, which could be undone: what is not needed is appended to `lot`, of the others is noted when they are due.
     fn sift(&mut self, desk: &mut Desk<'_>, lot: &mut Vec<u32>) {
         self.clock.look(&desk.last, &desk.entries, &mut desk.looked);
-        lot.clear();
         for ((&place, e), (wanted, due)) in desk.places.iter().zip(&desk.entries).zip(desk.looked.each()) {
-            if wanted { self.last.set_due(place as usize, due) } else { lot.push(e.split) }
+            if wanted { self.last.set_due(place, due) } else { lot.push(e.split) }
         }
     }
 
     /// Puts what is due of a list on the desk, downwards from `at`, a lot at most; returns where to go on.
-    fn take_due(
-        &self,
-        which: Which,
-        mut at: usize,
-        all: bool,
-        desk: &mut Desk<'_>,
-        frame: &mut Frame<'_>,
-    ) -> usize {
+    fn take_due(&self, which: Which, at: usize, desk: &mut Desk<'_>, frame: &mut Frame<'_>) -> usize {
         let list = match which {
             Which::Last => &self.last,
             Which::Open => &self.open,
         };
         desk.clear();
-        while desk.places.len() < LOT {
-            let next = list.next_due(at, all, &self.clock);
-            if next == 0 || !frame.meter.goes_on() {
-                at = next;
-                break;
-            }
-            at = next - 1;
-            desk.places.push(at as u32);
-            frame.meter.looks += 1;
+        // Asked for the time once a lot.
+        if !frame.meter.goes_on() {
+            return at;
         }
-        // Apart: far places are waited for together.
-        let entries = desk.places.iter().map_while(|&p| list.get(p as usize)).map(|o| o.entry);
-        desk.entries.extend(entries);
-        at
+        let from = at.saturating_sub(LOT);
+        for k in (from..at).rev() {
+            if let Some((place, entry)) = list.ready(k) {
+                desk.put(place, entry);
+            }
+        }
+        frame.meter.looks += desk.places.len();
+        from
     }
 
     fn refine(&mut self, desk: &mut Desk<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
-        let (mut at, whole) = start(self.resume[1], self.open.len());
-        loop {
-            at = self.take_due(Which::Open, at, all, desk, frame);
-            if desk.places.is_empty() {
-                break;
-            }
+        let (mut at, whole) = start(self.resume[1], self.open.begin(all, &self.clock));
+        while at > 0 && !frame.meter.over {
+            at = self.take_due(Which::Open, at, desk, frame);
             self.look_at_open(desk, frame);
         }
         self.resume[1] = at;
         frame.whole &= whole;
+        let limits = &frame.meter.limits;
+        let unlimited = limits.faces == usize::MAX
+            && limits.operations == usize::MAX
+            && limits.expired.is_none()
+            && frame.fetches == usize::MAX;
         let mut lot = Vec::with_capacity(LOT);
         while let Some(&(rank, _)) = self.queue.peek() {
-            // Of one rank a lot.
+            // A lot; of one rank, where it matters which come first.
             lot.clear();
             while lot.len() < LOT
                 && let Some(&(r, Reverse(i))) = self.queue.peek()
-                && r == rank
+                && (r == rank || unlimited)
             {
                 self.queue.pop();
                 if !self.shelf.is_led(i) {
@@ -339,7 +337,7 @@ impl<S: ByteRanges> PagedView<S> {
         for ((&place, e), (wanted, due)) in desk.places.iter().zip(&desk.entries).zip(desk.looked.each()) {
             // Until it is applied.
             let due = if wanted { Due::NOW } else { self.ahead_of(e, due, &desk.judges) };
-            self.open.set_due(place as usize, due);
+            self.open.set_due(place, due);
             if wanted {
                 self.enqueue(desk.judges.rank(e), e.split, frame);
             }
@@ -363,7 +361,7 @@ impl<S: ByteRanges> PagedView<S> {
             for &i in part {
                 let old = self.shelf.head.base_vertices + 2 * i;
                 for (k, place) in (old..).zip(self.shelf.record(i).map_or([NONE; 2], |r| r.open_place)) {
-                    if let Some(o) = self.open.get(place as usize).filter(|o| o.node == k) {
+                    if let Some(o) = self.open.get(place).filter(|o| o.node == k) {
                         desk.put(place, &o.entry);
                     }
                 }
@@ -372,14 +370,14 @@ impl<S: ByteRanges> PagedView<S> {
             desk.clear();
             for &i in part {
                 let place = self.shelf.last_place(i);
-                if let Some(o) = self.last.get(place as usize).filter(|o| o.entry.split == i) {
+                if let Some(o) = self.last.get(place).filter(|o| o.entry.split == i) {
                     desk.put(place, &o.entry);
                 }
             }
             self.clock.look(&desk.last, &desk.entries, &mut desk.looked);
             for (&place, (wanted, due)) in desk.places.iter().zip(desk.looked.each()) {
                 if wanted {
-                    self.last.set_due(place as usize, due);
+                    self.last.set_due(place, due);
                 }
             }
         }
@@ -516,6 +514,8 @@ impl<S: ByteRanges> PagedView<S> {
     fn apply(&mut self, i: u32) -> Result<(), PagedError> {
         let needs = self.can_count(i, |r| r.dependents)?;
         let (node, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
+        // It says itself what it replaces, and what it replaces says by what.
+        let entry = self.open_at(node).filter(|e| e.split == i).ok_or(Damage::Fan(i as usize))?;
         if self.motions.is_none() {
             self.split_faces(i)?;
         }
@@ -527,16 +527,20 @@ impl<S: ByteRanges> PagedView<S> {
         for k in 0..self.shelf.further(i).len() {
             self.hold_split(self.shelf.further(i)[k]);
         }
-        self.free_split(i)?;
+        self.put_last(node, entry);
         let old = self.shelf.head.base_vertices + 2 * i;
-        self.offer(old)?;
-        self.offer(old + 1)
+        let centre = if self.shelf.moves { self.shelf.local_centre(old)? } else { entry.centre() };
+        self.offer(old, centre);
+        let centre = self.shelf.local_centre(old + 1)?;
+        self.offer(old + 1, centre);
+        Ok(())
     }
 
     /// No longer asks for split `i`, on which nothing that is depends; appends to `freed` what can be undone then.
     fn undo(&mut self, i: u32, freed: &mut Vec<u32>) -> Result<(), PagedError> {
         let needs = self.shelf.needs(i).ok_or(Damage::Fan(i as usize))?;
         let (node, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
+        let entry = self.last_at(i).ok_or(Damage::Fan(i as usize))?;
         let old = self.shelf.head.base_vertices + 2 * i;
         self.withdraw(old);
         self.withdraw(old + 1);
@@ -547,7 +551,7 @@ impl<S: ByteRanges> PagedView<S> {
             self.jump();
         }
         self.lead(i, needs, false);
-        self.offer(node)?;
+        self.put_open(node, entry);
         let from = freed.len();
         freed.extend(needs.iter().chain(self.shelf.further(i)).filter(|&&d| d != NONE && self.is_free(d)));
         for &d in &freed[from..] {

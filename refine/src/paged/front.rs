@@ -33,9 +33,9 @@ impl<S: ByteRanges> PagedView<S> {
         Ok((known, explicit))
     }
 
-    /// The slot of a face that a cut names, as `slot * 4 + edge`.
+    /// The slot of a face that a cut of a record names, as `slot * 4 + edge`.
     fn cut(&self, i: u32, cut: u32) -> Result<u32, Damage> {
-        match self.shelf.slot_of(cut >> 2) {
+        match self.shelf.slot_of_cut(cut) {
             NONE => Err(Damage::Reference { what: "split", at: i as usize, to: cut }),
             slot => Ok(slot << 2 | cut & 3),
         }

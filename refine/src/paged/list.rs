@@ -1,92 +1,275 @@
 //! Splits that could be made or undone next, and when to look at them: the times apart, as most frames look at few of many.
+//!
+//! Entries keep their places, and places are used again: so what is taken out moves no other, whose page would have to be told. Few frames ask all times. From time to time all are, for those that
+//! may come before a *horizon*, some frames like the last from now; until lenses have passed that, frames ask these alone.
 
-use crate::selective::{Clocks, Due, Entry};
+use crate::aif::NONE;
+use crate::selective::{Clocks, Due, Entry, Sums};
 
 /// A split that may come next, or may be undone next.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Open {
     pub(super) entry: Entry,
-    /// The node it replaces.
+    /// The node it replaces; [`NONE`] of a free place, whose split is the next one that is free.
     pub(super) node: u32,
 }
 
+/// Frames to the horizon, at most.
+const FRAMES: f64 = 16.0;
+
 /// A list without order.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct List {
     of: Vec<Open>,
+    /// Free places are never due.
     due: Vec<Due>,
+    /// The first free place.
+    free: u32,
+    /// Places that are due before the horizon, and when. What has been told otherwise since is still there, and left out when it comes.
+    soon: Vec<(u32, Due)>,
+    horizon: Option<Sums>,
+    /// Places that are due in this frame; some may have been taken out since.
+    ready: Vec<u32>,
+}
+
+impl Default for List {
+    fn default() -> Self {
+        List {
+            of: Vec::new(),
+            due: Vec::new(),
+            free: NONE,
+            soon: Vec::new(),
+            horizon: None,
+            ready: Vec::new(),
+        }
+    }
 }
 
 impl List {
     /// Bytes of an entry.
-    pub(super) const ENTRY: usize = size_of::<Open>() + size_of::<Due>();
+    pub(super) const ENTRY: usize =
+        size_of::<Open>() + size_of::<Due>() + size_of::<(u32, Due)>() + size_of::<u32>();
 
-    pub(super) fn len(&self) -> usize {
-        self.of.len()
-    }
-
-    /// Of both arrays the lesser.
+    /// Of all arrays the least.
     pub(super) fn capacity(&self) -> usize {
-        self.of.capacity().min(self.due.capacity())
+        let lists = self.soon.capacity().min(self.ready.capacity());
+        self.of.capacity().min(self.due.capacity()).min(lists)
     }
 
     pub(super) fn bytes(&self) -> usize {
-        size_of::<Open>() * self.of.capacity() + size_of::<Due>() * self.due.capacity()
+        size_of::<Open>() * self.of.capacity()
+            + size_of::<Due>() * self.due.capacity()
+            + size_of::<(u32, Due)>() * self.soon.capacity()
+            + size_of::<u32>() * self.ready.capacity()
     }
 
     /// Room for so many in all.
     pub(super) fn reserve_to(&mut self, to: usize) {
-        self.of.reserve_exact(to.saturating_sub(self.of.len()));
-        self.due.reserve_exact(to.saturating_sub(self.due.len()));
-    }
-
-    #[inline]
-    pub(super) fn get(&self, at: usize) -> Option<&Open> {
-        self.of.get(at)
-    }
-
-    /// The last ones, so many if there are.
-    pub(super) fn tail(&self, most: usize) -> &[Open] {
-        &self.of[self.of.len() - most.min(self.of.len())..]
-    }
-
-    #[inline]
-    pub(super) fn push(&mut self, open: Open, due: Due) {
-        self.of.push(open);
-        self.due.push(due);
-    }
-
-    /// Takes out entry `at`, which there is; returns the one that is there now, if any.
-    #[inline]
-    pub(super) fn take_out(&mut self, at: usize) -> Option<Open> {
-        self.of.swap_remove(at);
-        self.due.swap_remove(at);
-        self.of.get(at).copied()
-    }
-
-    #[inline]
-    pub(super) fn set_due(&mut self, at: usize, due: Due) {
-        if let Some(d) = self.due.get_mut(at) {
-            *d = due;
+        fn grow<T>(v: &mut Vec<T>, to: usize) {
+            v.reserve_exact(to.saturating_sub(v.len()));
         }
+        grow(&mut self.of, to);
+        grow(&mut self.due, to);
+        grow(&mut self.soon, to);
+        grow(&mut self.ready, to);
     }
 
-    /// The place behind the next entry that is due (`all`: any), downwards from `at`; 0 if none is.
+    /// What is in a place.
     #[inline]
-    pub(super) fn next_due(&self, at: usize, all: bool, clock: &Clocks) -> usize {
-        let at = at.min(self.due.len());
-        if all {
-            return at;
-        }
-        let (due, sums) = (&self.due[..at], clock.sums());
-        // Most are not: asked without a branch for each.
-        let (rest, blocks) = due.as_rchunks::<16>();
-        for (k, block) in blocks.iter().enumerate().rev() {
-            if block.iter().fold(false, |any, &d| any | sums.have_reached(d)) {
-                let last = block.iter().rposition(|&d| sums.have_reached(d));
-                return last.map_or(0, |j| rest.len() + 16 * k + j + 1);
+    pub(super) fn get(&self, at: u32) -> Option<&Open> {
+        self.of.get(at as usize).filter(|o| o.node != NONE)
+    }
+
+    /// Adds an entry that is to be looked at at once; returns its place.
+    #[inline]
+    pub(super) fn push(&mut self, open: Open) -> u32 {
+        let at = self.free;
+        match self.of.get_mut(at as usize) {
+            Some(place) => {
+                self.free = place.entry.split;
+                *place = open;
+                self.set_due(at, Due::NOW);
+                at
+            }
+            None => {
+                let at = self.of.len() as u32;
+                self.of.push(open);
+                self.due.push(Due::NEVER);
+                self.set_due(at, Due::NOW);
+                at
             }
         }
-        rest.iter().rposition(|&d| sums.have_reached(d)).map_or(0, |k| k + 1)
+    }
+
+    /// Takes out what is in a place.
+    #[inline]
+    pub(super) fn take_out(&mut self, at: u32) {
+        if let Some(o) = self.of.get_mut(at as usize).filter(|o| o.node != NONE) {
+            (o.node, o.entry.split) = (NONE, self.free);
+            self.due[at as usize] = Due::NEVER;
+            self.free = at;
+        }
+    }
+
+    #[inline]
+    pub(super) fn set_due(&mut self, at: u32, due: Due) {
+        let Some(d) = self.due.get_mut(at as usize) else { return };
+        *d = due;
+        if self.horizon.is_some_and(|h| h.have_reached(due)) {
+            // More than there is room for: then all are asked again.
+            if self.soon.len() >= self.soon.capacity().min(self.ready.capacity()) {
+                self.forget();
+            } else {
+                self.soon.push((at, due));
+            }
+        }
+    }
+
+    /// Begins a frame: finds the places that are due; `all`: those of all entries. Returns how many there are.
+    pub(super) fn begin(&mut self, all: bool, clock: &Clocks) -> usize {
+        let now = clock.sums();
+        if all {
+            self.forget();
+            self.ready.clear();
+            let there = (0..).zip(&self.due).filter(|(_, d)| **d != Due::NEVER).map(|(at, _)| at);
+            self.ready.extend(there);
+            return self.ready.len();
+        }
+        match self.horizon.filter(|h| h.include(now)) {
+            Some(_) => self.ask_soon(now),
+            None => {
+                // So many that asking all, shared by the frames to the horizon, takes as long as asking those that come before it.
+                let frames = self.of.len() as f64 / self.ready.len().max(1) as f64;
+                self.forget();
+                let horizon = clock.horizon(frames.sqrt().clamp(1.0, FRAMES));
+                self.ask_all(now, horizon);
+                self.horizon = Some(horizon);
+            }
+        }
+        self.ready.len()
+    }
+
+    fn forget(&mut self) {
+        self.horizon = None;
+        self.soon.clear();
+    }
+
+    /// Most do not come before the horizon: asked without a branch for each.
+    fn ask_all(&mut self, now: Sums, horizon: Sums) {
+        self.ready.clear();
+        let mut first = 0;
+        for block in self.due.chunks(16) {
+            if block.iter().fold(false, |any, &d| any | horizon.have_reached(d)) {
+                for (at, &d) in (first..).zip(block) {
+                    if now.have_reached(d) {
+                        self.ready.push(at);
+                    } else if horizon.have_reached(d) {
+                        self.soon.push((at, d));
+                    }
+                }
+            }
+            first += 16;
+        }
+    }
+
+    fn ask_soon(&mut self, now: Sums) {
+        self.ready.clear();
+        let (due, ready) = (&self.due, &mut self.ready);
+        self.soon.retain(|&(at, told)| {
+            let is_due = now.have_reached(told);
+            // It may have been told otherwise, or be of another entry, since.
+            if is_due && due.get(at as usize) == Some(&told) {
+                ready.push(at);
+            }
+            !is_due
+        });
+    }
+
+    /// Place `k` of those that are due, and what is there; `None` if it was taken out.
+    #[inline]
+    pub(super) fn ready(&self, k: usize) -> Option<(u32, &Entry)> {
+        let at = *self.ready.get(k)?;
+        self.get(at).map(|o| (at, &o.entry))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hierarchy::{Packed, pack_up};
+    use crate::selective::{Cull, Judges, Lens, Looked};
+    use crate::view::{Camera, CameraParameters, Projection};
+    use glam::{DMat4, DVec3};
+    use std::collections::{BTreeMap, BTreeSet};
+
+    fn entry(split: u32, at: DVec3) -> Entry {
+        let packed = Packed { error: pack_up(0.002), radius: pack_up(0.01), ..Packed::default() };
+        Entry::new(split, at.as_vec3(), packed)
+    }
+
+    /// On a flight that goes faster, stands and turns, while entries come and go, what is found to be due is what is when all are asked.
+    #[test]
+    fn what_is_due_is_found() {
+        let mut state = 7u64;
+        let mut unit = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as f64 / (1u64 << 31) as f64
+        };
+        let mut vector = move || DVec3::new(unit(), unit(), 0.1 * unit()) - DVec3::new(0.5, 0.5, 0.0);
+        let (mut clock, mut list) = (Clocks::new(1.4), List::default());
+        list.reserve_to(600);
+        // When each place was told to be due.
+        let mut told: BTreeMap<u32, Due> = BTreeMap::new();
+        let (mut eye, mut angle, mut splits) = (DVec3::new(-0.4, 0.0, 0.05), 0.0f64, 0);
+        let (mut found_soon, mut all_found) = (0, 0);
+        for frame in 0..300 {
+            let speed = [0.0, 1e-4, 1e-3, 4e-3][frame / 10 % 4];
+            angle += [0.0, 0.0, 2e-3][frame / 7 % 3];
+            let look = DVec3::new(angle.cos(), angle.sin(), -0.1);
+            eye += speed * look;
+            let camera = Camera::new(&CameraParameters {
+                eye,
+                target: eye + look,
+                up: DVec3::Z,
+                projection: Projection::Perspective { fov_y_deg: 50.0 },
+                width: 800,
+                height: 600,
+                near: 1e-3,
+                far: 20.0,
+            });
+            let lens = Lens::about(DVec3::ZERO, &camera.unwrap(), &DMat4::IDENTITY, 1.0, Cull::Frustum);
+            let lens = [lens.unwrap()];
+            let judges = Judges::new(&lens, 1.0);
+            let stands = clock.go_on(&judges);
+            let soon = list.horizon.is_some_and(|h| h.include(clock.sums()));
+            let count = list.begin(!stands, &clock);
+            let found: BTreeSet<u32> = (0..count).filter_map(|k| list.ready(k)).map(|r| r.0).collect();
+            let due = |d: &Due| !stands || clock.sums().have_reached(*d);
+            let expected: BTreeSet<u32> = told.iter().filter(|t| due(t.1)).map(|t| *t.0).collect();
+            assert_eq!(found, expected, "frame {frame}");
+            if soon && stands {
+                found_soon += found.len();
+            }
+            all_found += found.len();
+            let asked: Vec<Entry> = found.iter().map(|&p| list.get(p).unwrap().entry).collect();
+            let mut looked = Looked::default();
+            clock.look(&clock.next(&judges), &asked, &mut looked);
+            for (&place, (_, due)) in found.iter().zip(looked.each()) {
+                list.set_due(place, due);
+                told.insert(place, due);
+            }
+            let gone: Vec<u32> = told.keys().copied().filter(|p| (p + frame as u32) % 97 == 0).collect();
+            for p in gone {
+                list.take_out(p);
+                told.remove(&p);
+            }
+            while told.len() < 500 {
+                let place = list.push(Open { entry: entry(splits, vector()), node: splits });
+                assert_eq!(list.get(place).map(|o| o.node), Some(splits));
+                assert!(told.insert(place, Due::NOW).is_none() && place < 500);
+                splits += 1;
+            }
+        }
+        assert!(found_soon > 1000 && all_found < 300 * 250, "{found_soon} of {all_found}");
     }
 }

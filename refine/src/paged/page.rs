@@ -77,7 +77,7 @@ pub(super) const LINGERED: u8 = 8;
 #[derive(Clone, Debug)]
 pub(super) struct Record {
     pub(super) vertex: u32,
-    /// Its cuts.
+    /// Its cuts: edges of faces that are numbered as if every split made two, so that who made them is told by the number.
     pub(super) left: u32,
     pub(super) right: u32,
     /// The node that it replaces.
@@ -188,10 +188,14 @@ impl Page {
         if [links.parent.len(), links.next.len(), own.len()] != [count; 3] {
             return None;
         }
+        let by_maker = |cut: u32| match head.maker(cut >> 2) {
+            Some((i, second)) if cut != NONE => (head.base_faces + 2 * i + second as u32) << 2 | cut & 3,
+            _ => cut,
+        };
         let of = (0..count).map(|k| Record {
             vertex: block.splits.vertex[k],
-            left: block.splits.left[k],
-            right: block.splits.right[k],
+            left: by_maker(block.splits.left[k]),
+            right: by_maker(block.splits.right[k]),
             parent: links.parent[k],
             next: links.next[k],
             bounds: own[k],

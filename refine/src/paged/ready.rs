@@ -99,12 +99,12 @@ impl<S: ByteRanges> PagedView<S> {
             for (d, need) in needs.iter().flatten() {
                 if need.flags & LED == 0 {
                     tell(*d);
-                } else if let Some(o) = self.last.get(need.last_place as usize) {
+                } else if let Some(o) = self.last.get(need.last_place) {
                     reads.ask(&o.node);
                 }
             }
             let open = shelf.open_place(r.parent);
-            self.open.get(open as usize).iter().for_each(|o| reads.ask(&o.node));
+            self.open.get(open).iter().for_each(|o| reads.ask(&o.node));
             for ((slot, need), side) in slots.iter_mut().zip(&needs[1..]).zip(sides) {
                 *slot = need.map_or(NONE, |(_, r)| r.slots[*side]);
             }
@@ -126,13 +126,6 @@ impl<S: ByteRanges> PagedView<S> {
             *of = shelf.record(i);
             of.iter().for_each(|r| reads.ask_for(r));
         }
-        // Those at the end of a list go where something is taken out.
-        for o in self.open.tail(2 * lot.len()) {
-            shelf.record(shelf.maker(o.node)).iter().for_each(|r| reads.ask_for(r));
-        }
-        for o in self.last.tail(lot.len()) {
-            shelf.record(o.entry.split).iter().for_each(|r| reads.ask_for(r));
-        }
         reads.wait();
         for r in of.iter().flatten() {
             for d in shelf.needs_of(r).into_iter().filter(|&d| d != NONE) {
@@ -143,7 +136,7 @@ impl<S: ByteRanges> PagedView<S> {
                 shelf.record(maker).iter().for_each(|r| reads.ask_for(r));
             }
             for place in r.open_place {
-                self.open.get(place as usize).iter().for_each(|o| reads.ask(&o.node));
+                self.open.get(place).iter().for_each(|o| reads.ask(&o.node));
             }
             self.ask_for_faces(r.slots.into_iter(), &mut reads);
         }

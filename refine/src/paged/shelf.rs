@@ -37,11 +37,7 @@ pub struct Traffic {
 struct ChunkAt {
     /// Its place in the directory.
     index: u32,
-    first: u32,
-    first_face: u32,
     first_wedge: u32,
-    /// Splits before it that make one face only, and those behind its end.
-    singles: [u32; 2],
     /// The most that the page takes.
     most: usize,
     touched: bool,
@@ -54,6 +50,8 @@ pub(super) struct Shelf<S> {
     pub(super) head: Arc<MeshHead>,
     pub(super) base: Base,
     chunks: Vec<ChunkAt>,
+    /// The first split of each, and the number of all.
+    firsts: Vec<u32>,
     /// The chunk that holds every 1024th split.
     index: Vec<u32>,
     pages: Vec<Option<Box<Page>>>,
@@ -172,6 +170,7 @@ impl<S: ByteRanges> Shelf<S> {
         }
         let point = if head.double { 24 } else { 12 };
         let (mut chunks, mut index, mut moves, mut scratch) = (Vec::new(), Vec::new(), false, 0);
+        let mut firsts = Vec::new();
         let mut all = Vec::new();
         for c in directory.chunks.iter().filter(|c| c.mesh == m) {
             match c.kind {
@@ -207,16 +206,15 @@ impl<S: ByteRanges> Shelf<S> {
             while index.len() * STRIDE < (c.first + c.count) as usize {
                 index.push(k as u32);
             }
+            firsts.push(c.first);
             chunks.push(ChunkAt {
                 index: c.index,
-                first: c.first,
-                first_face: head.first_face(c.first),
                 first_wedge: p.first_face,
-                singles: [c.first, c.first + c.count].map(|i| head.single.partition_point(|&s| s < i) as u32),
                 most: Page::most_bytes(c.raw, p.raw, point, c.count, wedges),
                 touched: false,
             });
         }
+        firsts.push(full);
         let faces: Vec<[u32; 3]> = match &mesh.wedges {
             None => mesh.base_faces.clone(),
             Some(w) => {
@@ -236,6 +234,7 @@ impl<S: ByteRanges> Shelf<S> {
             head: Arc::new(head),
             base,
             chunks,
+            firsts,
             index,
             pages,
             held: 0,
@@ -260,7 +259,7 @@ impl<S: ByteRanges> Shelf<S> {
             + usize::try_from(Room::base_bytes(&self.head)).unwrap_or(usize::MAX / 4)
             + head
             + size_of::<ChunkAt>() * self.chunks.capacity()
-            + 4 * self.index.capacity()
+            + 4 * (self.index.capacity() + self.firsts.capacity())
             + 8 * self.pages.capacity()
             + size_of::<Chunk>() * directory.chunks.capacity() / (directory.meshes as usize).max(1)
             + self.held
@@ -316,40 +315,10 @@ impl<S: ByteRanges> Shelf<S> {
             return self.chunks.len();
         }
         let mut k = self.index.get(i as usize / STRIDE).map_or(0, |&k| k as usize);
-        while self.chunks.get(k + 1).is_some_and(|c| c.first <= i) {
+        while self.firsts.get(k + 1).is_some_and(|&first| first <= i) {
             k += 1;
         }
         k
-    }
-
-    /// The chunk that makes face `f`, which there is; `None` of the base's.
-    #[inline]
-    fn chunk_of_face(&self, f: u32) -> Option<usize> {
-        let k = f.checked_sub(self.head.base_faces)?;
-        // Never behind it: splits make two faces at most.
-        let mut c = self.chunk_of(k / 2);
-        while self.chunks.get(c + 1).is_some_and(|c| c.first_face <= f) {
-            c += 1;
-        }
-        Some(c)
-    }
-
-    /// The split that makes face `f`, which there is, and which of its two that is; [`NONE`] of the base's. Most chunks have no splits that make one face only, or few.
-    #[inline]
-    fn half_of_face(&self, f: u32) -> (u32, usize) {
-        let Some(c) = self.chunk_of_face(f) else { return (NONE, 0) };
-        let k = f - self.head.base_faces;
-        let [from, to] = self.chunks.get(c).map_or([0; 2], |c| c.singles.map(|s| s as usize));
-        let singles = self.head.single.get(from..to).unwrap_or_default();
-        // Of those those whose face comes before.
-        let (mut low, mut high) = (0, singles.len());
-        while low < high {
-            let mid = (low + high) / 2;
-            if 2 * singles[mid] - ((from + mid) as u32) < k { low = mid + 1 } else { high = mid }
-        }
-        // As if all made two.
-        let k = k + (from + low) as u32;
-        (k / 2, (k % 2) as usize)
     }
 
     /// The page of split `i` if it is there, and the split's place in it.
@@ -547,10 +516,13 @@ impl<S: ByteRanges> Shelf<S> {
         [self.maker(r.parent), self.half_of_cut(r.left).0, self.half_of_cut(r.right).0]
     }
 
-    /// The split that makes the face of a cut, and which of its two that is; [`NONE`] of the base's, and of none.
+    /// The split that makes the face of a cut of a [`Record`], and which of its two that is; [`NONE`] of the base's, and of none.
     #[inline]
     pub(super) fn half_of_cut(&self, cut: u32) -> (u32, usize) {
-        if cut == NONE { (NONE, 0) } else { self.half_of_face(cut >> 2) }
+        match (cut >> 2).checked_sub(self.head.base_faces) {
+            Some(k) if cut != NONE => (k / 2, (k % 2) as usize),
+            _ => (NONE, 0),
+        }
     }
 
     /// The split that made a node; [`NONE`] for the base's.
@@ -643,11 +615,11 @@ impl<S: ByteRanges> Shelf<S> {
         }
     }
 
-    /// The slot of face `f`; [`NONE`] if it is not in the mesh.
+    /// The slot of the face of a cut of a [`Record`]; [`NONE`] if it is not in the mesh.
     #[inline]
-    pub(super) fn slot_of(&self, f: u32) -> u32 {
-        match self.half_of_face(f) {
-            (NONE, _) => self.base.slot.get(f as usize).copied().unwrap_or(NONE),
+    pub(super) fn slot_of_cut(&self, cut: u32) -> u32 {
+        match self.half_of_cut(cut) {
+            (NONE, _) => self.base.slot.get((cut >> 2) as usize).copied().unwrap_or(NONE),
             (i, side) => self.record(i).map_or(NONE, |r| r.slots[side]),
         }
     }
@@ -761,7 +733,16 @@ impl<S: ByteRanges> Shelf<S> {
         }
     }
 
-    /// The same about the origin of the bounds.
+    /// Where vertex `v`, which is in the mesh, stands about the origin of the bounds if nothing moves it.
+    pub(super) fn local_place(&self, v: u32) -> Result<Vec3, PagedError> {
+        let place = match v.checked_sub(self.head.base_vertices) {
+            None => self.base.mesh.base_positions.get(v as usize),
+            Some(i) => self.page(i).map(|(p, k)| p.place(k)).ok_or(Damage::Fan(i as usize))?,
+        };
+        Ok((place - self.base.links.origin).as_vec3())
+    }
+
+    /// Where a node stands about the origin of the bounds.
     pub(super) fn local_centre(&self, node: u32) -> Result<Vec3, PagedError> {
         Ok((self.position(node)? - self.base.links.origin).as_vec3())
     }

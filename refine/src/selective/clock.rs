@@ -12,7 +12,7 @@
 
 mod near;
 
-pub(crate) use near::{Clocks, Due, Looked};
+pub(crate) use near::{Clocks, Due, Looked, Sums};
 
 use super::Lens;
 use super::entry::Entry;

@@ -32,6 +32,12 @@ impl Entry {
         Entry { centre, radius: unpack(b.radius), error: unpack(b.error), split, cone: b.cone, direction }
     }
 
+    /// Where it stands, about the origin of the bounds.
+    #[inline]
+    pub(crate) fn centre(&self) -> Vec3 {
+        self.centre
+    }
+
     #[inline]
     fn with_direction(mut self, h: &Hierarchy) -> Entry {
         self.direction = h.direction(self.split);

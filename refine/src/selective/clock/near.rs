@@ -45,6 +45,8 @@ const MOST: f64 = 4.0;
 impl Due {
     /// Always.
     pub(crate) const NOW: Due = Due { away: 0.0, until: f32::NEG_INFINITY };
+    /// Of what is not there.
+    pub(crate) const NEVER: Due = Due { away: 0.0, until: f32::INFINITY };
 }
 
 impl Clocks {
@@ -110,6 +112,12 @@ impl Clocks {
     #[inline]
     pub(crate) fn sums(&self) -> Sums {
         Sums { moved: self.moved as f32, turned: self.turned as f32 }
+    }
+
+    /// The sums after so many frames like the last.
+    pub(crate) fn horizon(&self, frames: f64) -> Sums {
+        let on = |sum: f64, step: f64| (sum + frames * step) as f32;
+        Sums { moved: on(self.moved, self.step[0]), turned: on(self.turned, self.step[1]) }
     }
 
     /// How slack is measured.
@@ -198,6 +206,11 @@ impl Sums {
     #[inline(always)]
     pub(crate) fn have_reached(self, due: Due) -> bool {
         self.moved + due.away * self.turned >= due.until
+    }
+
+    /// Others are no farther on in either way: then what has not come by these has not come by those, as rounding keeps the order.
+    pub(crate) fn include(self, others: Sums) -> bool {
+        others.moved <= self.moved && others.turned <= self.turned
     }
 }
 
