@@ -258,7 +258,8 @@ mod tests {
                 list.set_due(place, due);
                 told.insert(place, due);
             }
-            let gone: Vec<u32> = told.keys().copied().filter(|p| (p + frame as u32) % 97 == 0).collect();
+            let gone: Vec<u32> =
+                told.keys().copied().filter(|p| (p + frame as u32).is_multiple_of(97)).collect();
             for p in gone {
                 list.take_out(p);
                 told.remove(&p);
