@@ -33,16 +33,16 @@ pub(super) struct Layout {
 const SEGMENTS: usize = 2;
 
 /// Where the last two bands begin before an order. By `bench/examples/prefixes`, quadric with endpoint placement, the first 10, 25 and 50 % of the bytes have at most 1.07 times the rms of the
-/// method's own mesh on bunny, 1.23 on dragon, 1.14 on igea, 1.41 on horse with its attributes; with the bands of files without the order it was 2.41 on dragon. At 0.66 and 0.24 dragon takes
-/// 1.4 bits a vertex less, and has 1.37 times, but bunny 2.47 with a quarter of the bytes.
+/// method's own mesh on bunny, 1.25 on dragon, 1.15 on igea, 1.33 on horse with its attributes. At 0.66 and 0.24 dragon takes less, but bunny had 2.47 times with a quarter of the bytes.
 const BEFORE_ORDER: [f64; 2] = [0.69, 0.3];
 
 impl Layout {
-    /// For chunks that are read alone: wide bands, as a chunk repeats what its band builds on. On dragon without the order the first 10, 25 and 50 % of the bytes have 1.40, 1.47 and 1.48 times the
-    /// rms of the method's own mesh, and quantised to 14 bits it takes 35.8 bits a vertex; with 3, 0.5 and 0.33 it is 1.18, 1.20 and 1.07, and 39.5.
+    /// For chunks that are read alone: wide bands, as a chunk repeats what its band builds on. Dragon, igea and a generated scan of 400,000 faces decided: without the order their first 10, 25 and 50 % of the
+    /// bytes have 1.26, 1.28, 1.38 times the rms of the method's own mesh, 1.39, 1.24, 1.19, and 1.22, 1.15, 1.11 (`bench/examples/prefixes`). With 3.5, 0.8 and 0.13 dragon takes 0.9 bits a vertex less, and
+    /// has up to 1.51, the scan 1.81.
     pub(super) fn alone(chunk: Option<u32>) -> Layout {
         let chunk = chunk.unwrap_or(16_384).max(1) as usize;
-        Layout { chunk, growth: 3.5, last: 0.8, shift: 0.13, small: 4 * chunk, tail: [0.0; 2] }
+        Layout { chunk, growth: 3.4, last: 0.68, shift: 0.3, small: 4 * chunk, tail: [0.0; 2] }
     }
 
     /// For chunks that follow each other.
