@@ -2,13 +2,14 @@
 
 mod common;
 
-use common::{NAMES, Random, any_camera, least_closed, progressive};
+use common::{NAMES, Random, any_camera, least_closed, options, progressive, sample};
 use glam::{DMat4, DVec3};
 use progmesh_refine::aif::*;
-use progmesh_refine::hierarchy::{Hierarchy, Options as HierarchyOptions};
+use progmesh_refine::hierarchy::{Guarantee, Hierarchy, Options as HierarchyOptions, Rule};
+use progmesh_refine::progressive::build;
 use progmesh_refine::selective::{Cull, Lens, Limits, View};
 use progmesh_refine::simplify::measure::Surface;
-use progmesh_refine::simplify::{Method, Placement};
+use progmesh_refine::simplify::{Method, Placement, Quiet};
 use progmesh_refine::view::{Camera, CameraParameters, Projection};
 use progmesh_refine::{Cursor, ProgressiveMesh};
 use std::collections::{HashMap, HashSet};
@@ -479,10 +480,14 @@ fn measured(h: &Hierarchy, view: &View, camera: &Camera, random: &mut Random, sa
     worst
 }
 
+/// By the ring rule no view shows more than its tolerance: that is proven, so it holds for any mesh and camera there is. By the rule of cuts errors are measured, with a margin: nothing is
+/// promised of views that were not tried, and the same is asked only of those that are.
 #[test]
 fn what_is_shown_deviates_by_less_than_the_tolerance() {
     for (name, rule) in both(&["sphere", "scan", "terrain", "torus", "cad"]) {
         let h = hierarchy_by(rule, name, 12_000);
+        let proven = h.all_bounds().guarantee() == Guarantee::Settled;
+        assert_eq!(proven, rule.rule == Rule::Rings, "{name}");
         let mut view = View::new(h.clone());
         let mut random = Random(23);
         let mut ratios = Vec::new();
@@ -495,10 +500,44 @@ fn what_is_shown_deviates_by_less_than_the_tolerance() {
             ratios.push(worst / tau);
         }
         ratios.sort_by(f64::total_cmp);
-        assert!(ratios[15] <= 1.0, "{name}: {ratios:.2?}");
+        assert!(ratios[15] <= 1.0, "{name}, proven: {proven}: {ratios:.2?}");
         // Not bought by showing too much, in views that do not need all there is. Flat parts have no error at all.
         ratios.retain(|&r| r > 1e-3);
         assert!(name == "cad" || ratios[ratios.len() / 2] >= 0.3, "{name}: {ratios:.2?}");
+    }
+}
+
+/// A face seen almost from the side, beside much that turns its back and is coarse. With 12 samples a face those that told of it were left out before the mesh around them was as it is here, and the rule of cuts
+/// showed 1.40 of the tolerance.
+#[test]
+fn beside_what_turns_its_back_it_does_too() {
+    let pm = build(sample("torus", 12_000, 14), &options(Method::Quadric, None), &Quiet).unwrap().mesh;
+    let pm = Arc::new(pm);
+    for (rule, few) in [
+        (RULES[0], false),
+        (RULES[1].with_samples(12), true),
+        (RULES[1], false),
+        (RULES[1].with_samples(1000), false),
+    ] {
+        let h = Arc::new(Hierarchy::new(pm.clone(), &rule).unwrap());
+        let camera = Camera::new(&CameraParameters {
+            eye: DVec3::new(-0.2232209287559126, -0.9149198881848798, -0.7624743132104684),
+            target: DVec3::new(0.804343861027398, 0.3095533008992062, -0.38725148993987024),
+            up: DVec3::new(0.043323807418346405, -0.5617671832442284, 0.41477981582283974),
+            projection: Projection::Orthographic { ortho_height: 0.4 * h.extent().1 },
+            width: 640,
+            height: 480,
+            near: 0.01 * h.extent().1,
+            far: 10.0 * h.extent().1,
+        })
+        .unwrap();
+        let tau = 2.0;
+        let mut view = View::new(h.clone());
+        view.adapt(&Lens::new(&h, &camera, &DMat4::IDENTITY, tau, Cull::All).unwrap(), &Limits::default());
+        let ratio = measured(&h, &view, &camera, &mut Random(23), 100_000) / tau;
+        // Of few samples, too, so that it is known to be the place.
+        assert_eq!(ratio > 1.0, few, "{rule:?}: {ratio}");
+        assert!(ratio > 0.3, "{rule:?}: {ratio}");
     }
 }
 
