@@ -734,3 +734,47 @@ fn damaged(bytes: &[u8]) {
         );
     }
 }
+
+/// However little time there is in each frame, looking goes on where it was cut short.
+#[test]
+fn frames_with_little_time_come_to_an_end_of_what_is_too_fine() {
+    let bytes = file_by(Rule::Cuts, 512, "scan", 60_000, None);
+    let h = in_memory(&bytes);
+    let (centre, diagonal) = h.extent();
+    let c = camera(centre, diagonal, 0.3, 0.7);
+    let lens = |tau: f64| [Lens::new(&h, &c, &DMat4::IDENTITY, tau, Cull::All).unwrap()];
+    for tau in [0.402, 0.8] {
+        let mut out = paged(&bytes, PLENTY);
+        out.adapt(&lens(0.4), &PagedLimits::default()).unwrap();
+        let mut undone = 0;
+        for _ in 0..200 {
+            let asked = std::cell::Cell::new(0);
+            let expired = || asked.replace(asked.get() + 1) >= 1;
+            let limits = Limits { expired: Some(&expired), ..Limits::default() };
+            let done = out.adapt(&lens(tau), &PagedLimits { limits, ..Default::default() }).unwrap();
+            undone += done.done.collapses;
+        }
+        assert!(undone > 0);
+        assert_eq!(out.adapt(&lens(tau), &PagedLimits::default()).unwrap().done.collapses, 0);
+    }
+}
+
+/// What is left out is counted once, whatever was applied before it.
+#[test]
+fn what_is_left_out_is_counted_once() {
+    let bytes = file("scan", 24_000, None);
+    let h = in_memory(&bytes);
+    let (centre, diagonal) = h.extent();
+    let c = camera(centre, diagonal, 0.3, 0.7);
+    let mut out = paged(&bytes, PLENTY);
+    let mut left_out = |tau: f64, fetches: usize| {
+        let lens = Lens::new(&h, &c, &DMat4::IDENTITY, tau, Cull::All).unwrap();
+        out.adapt(&[lens], &PagedLimits { fetches, ..Default::default() }).unwrap().postponed
+    };
+    for fetches in [0, 0, 2, 2, 2, 2] {
+        left_out(1.0, fetches);
+    }
+    let found = left_out(1.0, 0);
+    // With another tolerance all are looked at.
+    assert!(found > 100 && found == left_out(1.0 + 1e-13, 0));
+}

@@ -168,13 +168,13 @@ fn bounds_in(source: Option<&dyn Source>, i: u32) -> Packed {
     source.map(|s| s.bounds(i)).unwrap_or_default()
 }
 
-/// Codes the links of the splits from `first` on, of the vertices and with the bounds given.
+/// Codes the links of the splits from `first` on, of the vertices and with the bounds given; by the ring rule they need `most` in all.
 fn code<C: Coder>(
     c: &mut C,
     head: &MeshHead,
     first: u32,
     vertices: &[u32],
-    own: Own<'_>,
+    (own, most): (Own<'_>, u64),
     source: Option<&dyn Source>,
 ) -> Option<Links> {
     let (n0, count) = (head.base_vertices, vertices.len());
@@ -245,7 +245,7 @@ fn code<C: Coder>(
     links.outside.sort_unstable_by_key(|o| o.0);
     if let Some(turns) = own.turns {
         let needs = |i: u32| source.map_or(&[][..], |s| s.further(i));
-        links.further = further::code(c, (n0, first), &links.parent, turns, needs)?;
+        links.further = further::code(c, (n0, first), &links.parent, turns, most, needs)?;
     }
     // No split replaces two nodes.
     links.outside.windows(2).all(|w| w[0].0 < w[1].0).then_some(links)
@@ -283,7 +283,7 @@ pub(super) fn write(
     source: &dyn Source,
 ) -> Option<(Vec<u8>, u64)> {
     let mut e = Encoder::default();
-    let links = code(&mut e, head, first, vertices, own, Some(source))?;
+    let links = code(&mut e, head, first, vertices, (own, u32::MAX.into()), Some(source))?;
     let mut out = Vec::new();
     e.finish(&mut out);
     Some((out, raw_bytes(&links)))
@@ -305,7 +305,9 @@ pub(crate) fn read(
     if own.bounds.len() != vertices.len() || own.turns.is_some_and(|t| t.len() != vertices.len()) {
         return None;
     }
-    let links = code(&mut Decoder::new(bytes)?, head, first, vertices, own, None)?;
+    // As many as there is said to be room for.
+    let most = raw.saturating_sub((SPLIT + LIST) * vertices.len() as u64) / NEED;
+    let links = code(&mut Decoder::new(bytes)?, head, first, vertices, (own, most), None)?;
     (raw_bytes(&links) == raw).then_some(links)
 }
 

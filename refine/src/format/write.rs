@@ -26,7 +26,7 @@ pub struct EncodeOptions {
     /// Beside every chunk, what refining out of core takes ([`crate::paged`]): links of the vertex hierarchy. Only without [`EncodeOptions::sequential`], of meshes with bounds
     /// ([`ProgressiveMesh::bounds`]). Where those are by the ring rule, the splits come by their errors, and what that rule needs goes along.
     pub pages: bool,
-    /// Splits of a chunk, at most but for those of a single vertex and the few that others need; by default 16,384, and 8,192 of chunks that follow each other. With smaller ones less has to be fetched for a region,
+    /// Splits of a chunk, at most but for those of a few single vertices and the few that others need; by default 16,384, and 8,192 of chunks that follow each other. With smaller ones less has to be fetched for a region,
     /// and more in all.
     pub chunk: Option<u32>,
     /// Chunks of other kinds, which readers may skip: what they are, of which mesh (`u32::MAX` for none), and what they hold. They stand before all splits; [`ChunkType::EXTRAS`] behind all else.

@@ -76,6 +76,9 @@ struct Frame<'a> {
 /// Needed splits whose pages other threads make while one is decoded.
 const IN_SIGHT: usize = 64;
 
+/// Lots that are looked at, at most, before what is found to be undone is undone: half of what is looked at between two questions for the time.
+const LOTS: usize = 8;
+
 /// Of the two lists.
 #[derive(Clone, Copy)]
 enum Which {
@@ -171,14 +174,16 @@ impl<S: ByteRanges> PagedView<S> {
         let (mut at, whole) = start(self.resume[0], self.last.begin(all, &self.clock));
         let mut freed = Vec::new();
         let mut lot = Vec::with_capacity(2 * LOT);
-        let mut from = at;
+        let (mut from, mut looked) = (at, 0);
         while at > 0 && !frame.meter.over {
             at = self.take_due(Which::Last, at, desk, frame);
             self.sift(desk, &mut lot);
-            // Few of those looked at are undone: when they are a lot, memory is waited for together.
-            if lot.len() < LOT && at > 0 {
+            looked += 1;
+            // Few of those looked at are undone: when they are a lot, memory is waited for together. But before the time is asked for: what a frame has not undone when it ends is looked at again.
+            if lot.len() < LOT && looked < LOTS && at > 0 {
                 continue;
             }
+            looked = 0;
             self.undo_lot(&lot, &mut freed, frame)?;
             // The rest at the end.
             while freed.len() >= LOT && !frame.meter.over {
@@ -292,7 +297,7 @@ impl<S: ByteRanges> PagedView<S> {
             && frame.fetches == usize::MAX;
         let mut lot = Vec::with_capacity(LOT);
         while let Some(&(rank, _)) = self.queue.peek() {
-            // A lot; of one rank, where it matters which come first.
+            // A lot; of one rank, where a limit of the frame makes it matter which come first. (Of memory: by lots.)
             lot.clear();
             while lot.len() < LOT
                 && let Some(&(r, Reverse(i))) = self.queue.peek()

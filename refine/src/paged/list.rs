@@ -183,6 +183,9 @@ impl List {
             }
             !is_due
         });
+        // What was put there, or told, more than once since.
+        ready.sort_unstable();
+        ready.dedup();
     }
 
     /// Place `k` of those that are due, and what is there; `None` if it was taken out.
@@ -243,7 +246,10 @@ mod tests {
             let stands = clock.go_on(&judges);
             let soon = list.horizon.is_some_and(|h| h.include(clock.sums()));
             let count = list.begin(!stands, &clock);
-            let found: BTreeSet<u32> = (0..count).filter_map(|k| list.ready(k)).map(|r| r.0).collect();
+            let found: Vec<u32> = (0..count).filter_map(|k| list.ready(k)).map(|r| r.0).collect();
+            let times = found.len();
+            let found: BTreeSet<u32> = found.into_iter().collect();
+            assert_eq!(found.len(), times, "each once, frame {frame}");
             let due = |d: &Due| !stands || clock.sums().have_reached(*d);
             let expected: BTreeSet<u32> = told.iter().filter(|t| due(t.1)).map(|t| *t.0).collect();
             assert_eq!(found, expected, "frame {frame}");

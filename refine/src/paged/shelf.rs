@@ -124,7 +124,7 @@ fn on_the_way(head: &MeshHead, [c, page]: [&Chunk; 2], room: Room, settled: bool
     // One after the other, but what was read first is there.
     // And until the page is put together, what it is put together from is there.
     // Turns, and which way deviations lie.
-    let more = 6 * u64::from(settled);
+    let more = 2 + 4 * u64::from(settled);
     let parts = (18 + 24 + pages::SPLIT + size_of::<Packed>() as u64 + more) * c.count as u64;
     let beside = pages::scratch(c.count, page.raw, settled).max(parts);
     let all = fetched.saturating_add(room.bytes(head, c)).saturating_add(beside);

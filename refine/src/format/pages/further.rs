@@ -96,12 +96,13 @@ impl<'a> Turns<'a> {
     }
 }
 
-/// Codes what the splits from `first` on, whose parents and turns are given, need; `needs` says it when they are written. `None`: damage.
+/// Codes what the splits from `first` on, whose parents and turns are given, need, `most` in all; `needs` says it when they are written. `None`: damage.
 pub(super) fn code<'s, C: Coder>(
     c: &mut C,
     (n0, first): (u32, u32),
     parents: &[u32],
     turns: &[u32],
+    most: u64,
     needs: impl Fn(u32) -> &'s [u32],
 ) -> Option<Lists> {
     let by_turn = Turns::new(turns, descent((n0, first), parents));
@@ -123,6 +124,10 @@ pub(super) fn code<'s, C: Coder>(
         }
         of.sort_unstable_by_key(|&(earlier, d)| (earlier, !d));
         let count = c.number(&mut codec.count, of.len() as u64);
+        // A need may take next to nothing of the stream.
+        if count > most.saturating_sub(out.on.len() as u64) {
+            return None;
+        }
         let (mut inside, mut before) = (true, 0u32);
         for j in 0..count {
             let model = (j as usize).min(FIRST - 1);
@@ -167,7 +172,7 @@ mod tests {
     const N0: u32 = 3;
 
     fn read(bytes: &[u8], first: u32, parents: &[u32], turns: &[u32]) -> Option<Lists> {
-        code(&mut Decoder::new(bytes)?, (N0, first), parents, turns, |_| &[])
+        code(&mut Decoder::new(bytes)?, (N0, first), parents, turns, u32::MAX.into(), |_| &[])
     }
 
     proptest! {
@@ -195,7 +200,7 @@ mod tests {
             }
             let mut e = Encoder::default();
             let of = |i: u32| &needs[(i - first) as usize][..];
-            let wrote = code(&mut e, (N0, first), &parents, &turns, of).unwrap();
+            let wrote = code(&mut e, (N0, first), &parents, &turns, u32::MAX.into(), of).unwrap();
             let mut bytes = Vec::new();
             e.finish(&mut bytes);
             let lists = read(&bytes, first, &parents, &turns).unwrap();
@@ -273,7 +278,23 @@ mod tests {
             let mut e = Encoder::default();
             let list = [d];
             let needs = |i: u32| if i == 10 { &list[..] } else { &[] };
-            assert_eq!(code(&mut e, (N0, 10), &[0; 3], &[2, 1, 2], needs), None);
+            assert_eq!(code(&mut e, (N0, 10), &[0; 3], &[2, 1, 2], u32::MAX.into(), needs), None);
         }
+    }
+
+    /// What is needed again and again takes next to nothing of a stream: the directory says how much it may be.
+    #[test]
+    fn no_more_is_read_than_is_announced() {
+        let n = 1 << 18;
+        let (mut e, mut codec) = (Encoder::default(), Codec::default());
+        e.number(&mut codec.count, n);
+        e.bit(&mut codec.inside[0], false);
+        e.signed(&mut codec.far, -1);
+        (1..n).for_each(|_| _ = e.signed(&mut codec.far, 0));
+        let mut bytes = Vec::new();
+        e.finish(&mut bytes);
+        let read = |most| code(&mut Decoder::new(&bytes).unwrap(), (N0, 10), &[0], &[2], most, |_| &[]);
+        assert!(bytes.len() < 1000 && read(n).unwrap().of(0).len() == 1 << 18);
+        assert_eq!(read(n - 1), None);
     }
 }
