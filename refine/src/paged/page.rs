@@ -192,6 +192,24 @@ impl Page {
             Some((i, second)) if cut != NONE => (head.base_faces + 2 * i + second as u32) << 2 | cut & 3,
             _ => cut,
         };
+        // By the ring rule what is needed has an earlier turn, or is in another chunk.
+        let turns = &links.further.turns;
+        let earlier = |k: usize, needed: Option<u32>| match needed.and_then(|d| d.checked_sub(block.first)) {
+            Some(j) => turns.get(j as usize).is_none_or(|&t| t < turns[k]),
+            None => true,
+        };
+        let of_cut = |cut: u32| match head.maker(cut >> 2) {
+            Some((i, _)) if cut != NONE => Some(i),
+            _ => None,
+        };
+        let in_turn = |k: usize| {
+            let parent = links.parent[k].checked_sub(n0).map(|p| p / 2);
+            let s = &block.splits;
+            [parent, of_cut(s.left[k]), of_cut(s.right[k])].into_iter().all(|needed| earlier(k, needed))
+        };
+        if turns.len() == count && !(0..count).all(in_turn) {
+            return None;
+        }
         let of = (0..count).map(|k| Record {
             vertex: block.splits.vertex[k],
             left: by_maker(block.splits.left[k]),
