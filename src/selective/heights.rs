@@ -107,16 +107,8 @@ impl Ground<'_> {
         }
         all.of.mean_pixels = all.sum / all.of.samples.max(1) as f64;
         drop(own);
-        all.of.seams = self.seams_of(triangles)?;
+        all.of.seams = self.seams(triangles)?;
         Ok(all.of)
-    }
-
-    /// Looks for cracks and folds alone, everywhere. O(triangles, and the length of the outline).
-    ///
-    /// # Errors
-    /// Those of reading heights: around void samples.
-    pub fn seams(&self, triangles: &[[DVec3; 3]]) -> Result<Seams, RasterError> {
-        self.seams_of(triangles)
     }
 
     /// Whether the box about the samples of a tile reaches into the frustum, which is given in the grid's coordinates if that is possible.
@@ -211,8 +203,12 @@ impl Ground<'_> {
         Ok(part)
     }
 
-    /// Edges that are cracks; edges and triangles that are folds. Corners are the same where their places in the world are, bit for bit.
-    fn seams_of(&self, world: &[[DVec3; 3]]) -> Result<Seams, RasterError> {
+    /// Looks for cracks and folds alone, everywhere: edges that are cracks, edges and triangles that are folds. Corners are the same where their places in the world are, bit for bit. O(n log n) for
+    /// n triangles, and the length of the outline.
+    ///
+    /// # Errors
+    /// Those of reading heights: around void samples.
+    pub fn seams(&self, world: &[[DVec3; 3]]) -> Result<Seams, RasterError> {
         // Edges as pairs of the corners' numbers, sorted: a tenth of the memory of a table of edges.
         let mut numbers: FxHashMap<[u64; 3], u32> = FxHashMap::default();
         let mut places: Vec<DVec3> = vec![];

@@ -72,7 +72,10 @@ impl Geodetic {
         if west >= 180.0 - slack {
             west -= 360.0;
         }
-        if !(west >= -180.0 - slack && west + width <= 180.0 + slack) && width + dx >= 360.0 - slack {
+        // Only where whole steps go round, and once: else what lies behind the seam would be moved, or be there twice.
+        let rest = ((360.0 / dx).round() * dx - 360.0).abs();
+        let closed = width + dx >= 360.0 - slack && width <= 360.0 + 2.0 * dx && rest <= 0.01 * dx;
+        if closed && !(west >= -180.0 - slack && west + width <= 180.0 + slack) {
             let (turned, first) = turn(grid, west, dx);
             let mut made = Geodetic::new(&turned, Affine([dx, 0.0, first, 0.0, dy, north]), across)?;
             made.turned = true;
@@ -324,6 +327,11 @@ mod tests {
         assert_eq!(fails([1.0, 0.0, 0.0, 0.0, 1.0, 0.0]), GeodeticError::Turned);
         assert!(matches!(fails([1.0, 0.0, 175.0, 0.0, -1.0, 0.0]), GeodeticError::Outside { .. }));
         assert!(matches!(fails([1.0, 0.0, 0.0, 0.0, -1.0, 95.0]), GeodeticError::Outside { .. }));
+        // Round the globe, but not in whole steps, or more than once.
+        for (columns, step) in [(53, 7.0), (800, 1.0)] {
+            let round = Geodetic::new(&plane(columns, 3), Affine::north_up([-100.0, 5.0], [step, 5.0]), 1);
+            assert!(matches!(round.map(|_| ()), Err(GeodeticError::Outside { .. })));
+        }
         // A turn of 360 brings it in.
         let east = Geodetic::new(&grid, Affine::north_up([200.0, 10.0], [1.0, 1.0]), 1).unwrap();
         assert!((east.transform().0[2] + 160.0).abs() < 1.0);

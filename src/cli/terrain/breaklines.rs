@@ -90,15 +90,22 @@ impl BreaklineArgs {
             let points = points.ok_or_else(|| failed("the grid's transform has no inverse".into()))?;
             for pair in points.windows(2) {
                 let pair = within_turn([pair[0], pair[1]], lattice.and_then(Geodetic::turn));
-                let Some(clipped) = clip([pair[0], pair[1]], most) else {
-                    facts.beyond += 1;
-                    continue;
-                };
-                facts.beyond += usize::from(clipped != [pair[0], pair[1]]);
-                let [a, b] = clipped.map(|p| p.map(|c| c.round() as u32));
-                if a != b {
-                    steps.push([a, b]);
+                let length = |[a, b]: [[f64; 2]; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+                let (mut found, mut kept) = (false, 0.0);
+                // What is beyond one side of a lattice round the globe is within the other.
+                let turn = lattice.and_then(Geodetic::turn);
+                for by in [Some(0.0), turn, turn.map(|t| -t)].into_iter().flatten() {
+                    let moved = [pair[0], pair[1]].map(|[x, y]| [x + by, y]);
+                    let Some(clipped) = clip(moved, most) else { continue };
+                    found = true;
+                    kept += length(clipped);
+                    let [a, b] = clipped.map(|p| p.map(|c| c.round() as u32));
+                    if a != b {
+                        steps.push([a, b]);
+                    }
                 }
+                let all = length([pair[0], pair[1]]);
+                facts.beyond += usize::from(!found || kept < all * (1.0 - 1e-9));
             }
         }
         facts.steps = steps.len();
