@@ -59,16 +59,22 @@ impl<S: ByteRanges> PagedView<S> {
         }
     }
 
+    /// The records of these, [`LOT`] at most, read.
+    fn records_of<'a>(&'a self, lot: &[u32], reads: &mut Reads<'a>) -> [Option<&'a Record>; LOT] {
+        let mut of = [None; LOT];
+        for (of, &i) in of.iter_mut().zip(lot) {
+            *of = self.shelf.record(i);
+            of.iter().for_each(|r| reads.ask_for(r));
+        }
+        reads.wait();
+        of
+    }
+
     /// What applying these takes; `tell` is told what they depend on and is not asked for.
     fn read_around(&self, lot: &[u32], mut tell: impl FnMut(u32)) {
         let shelf = &self.shelf;
         let mut reads = Reads::new();
-        let mut of = [None; LOT];
-        for (of, &i) in of.iter_mut().zip(lot) {
-            *of = shelf.record(i);
-            of.iter().for_each(|r| reads.ask_for(r));
-        }
-        reads.wait();
+        let mut of = self.records_of(lot, &mut reads);
         // The splits that they depend on, of which two make the faces of their cuts; the vertex's, and those that come next.
         let mut needs = [[None; 3]; LOT];
         let mut sides = [[0; 2]; LOT];
@@ -121,12 +127,7 @@ impl<S: ByteRanges> PagedView<S> {
     pub(super) fn ready_to_undo(&self, lot: &[u32]) {
         let shelf = &self.shelf;
         let mut reads = Reads::new();
-        let mut of = [None; LOT];
-        for (of, &i) in of.iter_mut().zip(lot) {
-            *of = shelf.record(i);
-            of.iter().for_each(|r| reads.ask_for(r));
-        }
-        reads.wait();
+        let of = self.records_of(lot, &mut reads);
         for r in of.iter().flatten() {
             for d in shelf.needs_of(r).into_iter().filter(|&d| d != NONE) {
                 shelf.record(d).iter().for_each(|r| reads.ask_for(r));
