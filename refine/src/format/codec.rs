@@ -204,6 +204,10 @@ impl<'a> Codec<'a> {
     }
 }
 
+/// The streams of a chunk that is written, and bytes of one: memory that serves for the next chunk, too.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Streams([Encoder; STREAMS], Vec<u8>);
+
 /// Writes the chunk of `count` splits from `first` on, before which `state` stands; if it is to be read alone, at the base, and given what it needs.
 pub(super) fn write(
     head: &MeshHead,
@@ -211,14 +215,14 @@ pub(super) fn write(
     state: &mut Sequel,
     (first, count): (Counts, usize),
     mut sources: Option<&mut Sources<'_>>,
+    Streams(streams, bytes): &mut Streams,
 ) -> Option<Vec<u8>> {
-    let mut streams: [Encoder; STREAMS] = Default::default();
     let range = first.split..first.split + count;
     let levels = pm.splits.error[range.clone()].iter().map(|&e| error_level(e) as u16);
     let levels = levels.fold([NO_LEVEL, 0], |[a, b], l| [a.min(l), b.max(l)]);
     let mut codec = Codec::new(head, state, first, sources.is_some());
     if let Some(sources) = sources.as_deref_mut() {
-        codec.context(&mut streams, pm, Some(sources), u64::MAX)?;
+        codec.context(streams, pm, Some(sources), u64::MAX)?;
     }
     let numbers = sources.as_deref();
     let vertex = |v: u32| numbers.map_or(v, |n| n.vertex(v));
@@ -229,15 +233,15 @@ pub(super) fn write(
     let mut source = Some(Source { pm, numbers, at: first });
     let mut nothing = SplitBlock::default();
     for _ in 0..count {
-        codec.split(&mut streams, &mut source, &mut nothing)?;
+        codec.split(streams, &mut source, &mut nothing)?;
     }
     let mut out = Vec::new();
     put_varint(&mut out, first.wedge as u64);
     for stream in streams {
-        let mut bytes = Vec::new();
-        stream.finish(&mut bytes);
+        bytes.clear();
+        stream.finish(bytes);
         put_varint(&mut out, bytes.len() as u64);
-        out.extend_from_slice(&bytes);
+        out.extend_from_slice(bytes);
     }
     // A byte for every split of the context, at least.
     let least = codec.known.map_or(0, |k| k.splits());

@@ -126,6 +126,8 @@ pub(super) struct Encoder {
     window: u64,
     filled: u32,
     plain: Vec<u8>,
+    /// Words of decisions, while the stream is put together.
+    words: Vec<u16>,
 }
 
 /// What to multiply by instead of dividing by `size`: this division does not wait for the state, as the next one does for it.
@@ -146,10 +148,11 @@ fn quotient(x: u32, inverse: u64) -> u32 {
 const LEAST: u32 = 1 << 16;
 
 impl Encoder {
-    /// Appends the stream to `out`: the length of the decisions as a varint, decisions, plain bits.
-    pub(super) fn finish(mut self, out: &mut Vec<u8>) {
+    /// Appends the stream to `out`: the length of the decisions as a varint, decisions, plain bits. Then another one can be written, in the same memory.
+    pub(super) fn finish(&mut self, out: &mut Vec<u8>) {
         // A word is put down after each decision, and overwritten if it was not needed: a branch would mostly be foretold wrongly.
-        let mut words = vec![0u16; self.shares.len() + 3];
+        let words = &mut self.words;
+        words.resize(words.len().max(self.shares.len() + 3), 0);
         let (mut state, mut n) = (LEAST, 0);
         for &(start, size) in self.shares.iter().rev() {
             let size = (size as u32).max(1);
@@ -164,10 +167,16 @@ impl Encoder {
             // The quotient's part and the rest.
             state = small + start as u32 + times * (TOTAL - size);
         }
-        words.truncate(n);
         if !self.shares.is_empty() {
-            words.extend([state as u16, (state >> 16) as u16]);
+            // There is room for three more.
+            for half in [state as u16, (state >> 16) as u16] {
+                if let Some(word) = words.get_mut(n) {
+                    *word = half;
+                }
+                n += 1;
+            }
         }
+        let words = words.get(..n).unwrap_or_default();
         put_varint(out, 2 * words.len() as u64);
         words.iter().rev().for_each(|w| out.extend_from_slice(&w.to_le_bytes()));
         while self.filled > 0 {
@@ -176,6 +185,9 @@ impl Encoder {
             self.filled = self.filled.saturating_sub(8);
         }
         out.extend_from_slice(&self.plain);
+        self.shares.clear();
+        self.plain.clear();
+        (self.window, self.filled) = (0, 0);
     }
 }
 

@@ -112,8 +112,8 @@ impl Nibble {
         let rate = RATES[(self.seen >> 2) as usize & 31];
         self.seen += (self.seen < 4 * RATES.len() as u8 - 1) as u8;
         let goals = &GOALS[symbol & 15];
-        for (s, goal) in self.start.iter_mut().zip(goals) {
-            *s += (goal - *s) >> rate;
+        for (k, goal) in goals.iter().enumerate() {
+            self.start[k] += (goal - self.start[k]) >> rate;
         }
     }
 }

@@ -10,6 +10,7 @@ use super::splits::{MOST_LEVEL, error_level};
 use crate::aif::NONE;
 use crate::hierarchy::Further;
 use crate::progressive::ProgressiveMesh;
+use std::cmp::Ordering;
 
 /// How splits are divided into bands and chunks.
 #[derive(Clone, Copy, Debug)]
@@ -102,45 +103,53 @@ pub(super) struct Plan {
     pub(super) levels: Vec<u32>,
 }
 
-/// What a plan looks at of a split, side by side: splits come in the order of their errors, so each is somewhere else in memory.
+/// What a plan looks at of a split, side by side. Splits of a band that descend from one vertex of its start stand side by side, too: as they come, in the order of their errors, each would be somewhere else in memory.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(32))]
 struct Node {
-    /// Splits it depends on.
+    /// Where those stand that it depends on.
     on: [u32; 3],
-    /// The next at its vertex, and the first at the vertex it makes.
+    /// Where the next at its vertex stands, and the first at the vertex it makes.
     again: u32,
     first: u32,
-    /// Its chunk, once it is in one.
-    chunk: u32,
-    /// In the order of descent: its vertex, and that of the start of its band which it descends from.
+    /// Its vertex, in the order of descent.
     vertex: u32,
-    root: u32,
 }
 
-/// The forest of splits.
-fn forest(pm: &ProgressiveMesh, rank: &[u32], roots: &[u32]) -> Vec<Node> {
+/// The forest of splits, given which one stands where.
+fn forest(pm: &ProgressiveMesh, on: &[[u32; 3]], rank: &[u32], splits: &[u32]) -> Vec<Node> {
     let n0 = pm.base_vertices();
-    let of = |((on, &v), &root): (([u32; 3], &u32), &u32)| {
-        let (vertex, root) = (rank[v as usize], rank[root as usize]);
-        Node { on, again: NONE, first: NONE, chunk: NONE, vertex, root }
-    };
-    let on = pm.dependencies().into_iter();
-    let mut nodes: Vec<Node> = on.zip(&pm.splits.vertex).zip(&roots[n0..]).map(of).collect();
-    for (i, &v) in (0u32..).zip(&pm.splits.vertex) {
-        let before = nodes[i as usize].on[0];
+    let place = places_of(splits);
+    let find = |i: u32| place.get(i as usize).copied().unwrap_or(NONE);
+    let mut nodes: Vec<Node> = splits
+        .iter()
+        .map(|&i| Node {
+            on: on[i as usize].map(find),
+            again: NONE,
+            first: NONE,
+            vertex: rank[pm.splits.vertex[i as usize] as usize],
+        })
+        .collect();
+    for at in 0..splits.len() {
+        let before = nodes[at].on[0];
         if let Some(node) = nodes.get_mut(before as usize) {
             // The one before is at the same vertex, or made it.
-            let to = if v as usize == n0 + before as usize { &mut node.first } else { &mut node.again };
-            *to = i;
+            let made = n0 + splits[before as usize] as usize;
+            let v = pm.splits.vertex[splits[at] as usize] as usize;
+            let to = if v == made { &mut node.first } else { &mut node.again };
+            *to = at as u32;
         }
     }
     nodes
 }
 
 impl Plan {
-    /// With `further`, what the ring rule needs beside: no chunk needs a later one then, and bands are by the bounds' errors, in whose order that rule has the splits. `None` if the splits refer to what does not exist.
-    pub(super) fn new(pm: &ProgressiveMesh, layout: Layout, further: Option<&Further>) -> Option<Plan> {
+    /// Given what every split depends on. With `further`, what the ring rule needs beside: no chunk needs a later one then, and bands are by the bounds' errors, in whose order that rule has the splits. `None` if the splits refer to what does not exist.
+    pub(super) fn new(
+        pm: &ProgressiveMesh,
+        on: &[[u32; 3]],
+        layout: Layout,
+        further: Option<&Further>,
+    ) -> Option<Plan> {
         let n = pm.splits.len();
         let n0 = pm.base_vertices();
         if pm.splits.vertex.iter().zip(n0..).any(|(&v, count)| v as usize >= count) {
@@ -157,24 +166,35 @@ impl Plan {
             let r = if maker.is_some_and(|m| bands[m] == bands[i]) { root[v] } else { v as u32 };
             root[n0 + i] = r;
         }
-        // By band, in each by the vertex they descend from.
-        let nodes = forest(pm, &rank, &root);
+        // By band, in each by the vertex they descend from, in the order of descent.
         let all: Vec<u32> = (0..n as u32).collect();
         let last = bands.iter().max().map_or(0, |&b| b as usize + 1);
-        let keys = sorted(&sorted(&all, pm.vertices(), |i| nodes[i as usize].root as usize), last, |i| {
-            bands[i as usize] as usize
-        });
-        let mut schedule = Schedule { nodes, further, done: vec![false; n], order: Vec::with_capacity(n) };
+        let rooted = sorted(&all, pm.vertices(), |i| rank[root[n0 + i as usize] as usize] as usize);
+        let splits = sorted(&rooted, last, |i| bands[i as usize] as usize);
+        let nodes = forest(pm, on, &rank, &splits);
+        let mut schedule = Schedule {
+            nodes,
+            splits: &splits,
+            further: further.map(|f| (f, places_of(&splits))),
+            chunk: vec![NONE; n],
+            done: vec![false; n],
+            order: Vec::with_capacity(n),
+        };
         let mut plan = Plan::default();
-        for band in keys.chunk_by(|&a, &b| bands[a as usize] == bands[b as usize]) {
+        let mut at = 0;
+        for band in splits.chunk_by(|&a, &b| bands[a as usize] == bands[b as usize]) {
             let name = bands[band[0] as usize];
-            let subtrees: Vec<Subtree<'_>> = band
-                .chunk_by(|&a, &b| schedule.root(a) == schedule.root(b))
-                .map(|splits| {
-                    let v = root[n0 + splits[0] as usize] as usize;
+            let of = |i: u32| root[n0 + i as usize];
+            let subtrees: Vec<Subtree> = band
+                .chunk_by(|&a, &b| of(a) == of(b))
+                .map(|same| {
+                    let v = of(same[0]) as usize;
                     let made = v.checked_sub(n0).map(|i| pm.new_positions.get(i).to_array());
+                    let first = at;
+                    at += same.len() as u32;
                     Subtree {
-                        splits,
+                        first,
+                        end: at,
                         at: made.unwrap_or_else(|| places::point(&pm.base_positions, v)),
                         left: 0,
                     }
@@ -184,11 +204,9 @@ impl Plan {
             // Regions still to be cut, the next one last.
             let mut regions = vec![(subtrees, usize::MAX)];
             while let Some((mut region, parts)) = regions.pop() {
-                region.iter_mut().for_each(|s| {
-                    s.left = s.splits.iter().filter(|&&i| !schedule.has(i)).count();
-                });
+                region.iter_mut().for_each(|s| s.left = schedule.left(s.first..s.end));
                 region.retain(|s| s.left > 0);
-                let left: usize = region.iter().map(|s| s.left).sum();
+                let left: usize = region.iter().map(|s| s.left as usize).sum();
                 let parts = parts.min(left.div_ceil(layout.chunk));
                 if parts > 1 && region.len() > 1 {
                     let rest = cut(&mut region, left, parts);
@@ -197,7 +215,10 @@ impl Plan {
                 } else if left > 0 {
                     let number = plan.pieces.len() as u32;
                     let mut taken = Vec::with_capacity(left + left / 8);
-                    region.iter().flat_map(|s| s.splits).for_each(|&i| schedule.take(i, number, &mut taken));
+                    region
+                        .iter()
+                        .flat_map(|s| s.first..s.end)
+                        .for_each(|i| schedule.take(i, number, &mut taken));
                     schedule.add(&taken, number);
                     let subtree = (plan.pieces.len() - before) as u32;
                     plan.pieces.push(Piece { count: taken.len(), band: name, subtree });
@@ -213,33 +234,62 @@ impl Plan {
     }
 }
 
+/// Where each stands.
+fn places_of(splits: &[u32]) -> Vec<u32> {
+    let mut place = vec![NONE; splits.len()];
+    splits.iter().zip(0..).for_each(|(&i, at)| place[i as usize] = at);
+    place
+}
+
 /// Splits of a band that descend from one vertex of its start, where that is, and how many of them no chunk has yet.
-struct Subtree<'a> {
-    splits: &'a [u32],
+struct Subtree {
+    first: u32,
+    end: u32,
+    left: u32,
     at: [f64; 3],
-    left: usize,
 }
 
 /// Cuts a region that is to be `parts` chunks across its longest side, and returns what lies behind the cut: both are compact, so that little around them has to be repeated.
-fn cut<'a>(region: &mut Vec<Subtree<'a>>, left: usize, parts: usize) -> Vec<Subtree<'a>> {
-    let side = |axis: usize| {
-        let [low, high] = region
-            .iter()
-            .map(|s| s.at[axis])
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
-        high - low
-    };
-    let sides = [side(0), side(1), side(2)];
+fn cut(region: &mut Vec<Subtree>, left: usize, parts: usize) -> Vec<Subtree> {
+    let (mut lows, mut highs) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for s in region.iter() {
+        for a in 0..3 {
+            (lows[a], highs[a]) = (lows[a].min(s.at[a]), highs[a].max(s.at[a]));
+        }
+    }
+    let sides: [f64; 3] = std::array::from_fn(|a| highs[a] - lows[a]);
     let longest = (0..3).max_by(|&a, &b| sides[a].total_cmp(&sides[b])).unwrap_or(0);
-    region.sort_by(|a, b| a.at[longest].total_cmp(&b.at[longest]));
     let aim = left / parts * (parts / 2);
+    // Slices across it, so that only one has to be sorted.
+    let (low, length) = (lows[longest], sides[longest]);
+    let slices = region.len().clamp(1, 1 << 12);
+    let scale = slices as f64 / length;
+    let slice = |s: &Subtree| (((s.at[longest] - low) * scale) as usize).min(slices - 1);
+    let mut sums = vec![0; slices];
+    region.iter().for_each(|s| sums[slice(s)] += s.left as usize);
     let mut sum = 0;
-    let until = region.iter().take_while(|s| {
-        sum += s.left;
+    let middle = sums.iter().take_while(|&&n| {
+        sum += n;
         sum <= aim
     });
-    let at = until.count().clamp(1, region.len() - 1);
-    region.split_off(at)
+    let middle = middle.count().min(slices - 1);
+    let mut sum: usize = sums[..middle].iter().sum();
+    let (mut near, mut far, mut between) = (Vec::new(), Vec::new(), Vec::new());
+    for s in region.drain(..) {
+        match slice(&s).cmp(&middle) {
+            Ordering::Less => near.push(s),
+            Ordering::Equal => between.push(s),
+            Ordering::Greater => far.push(s),
+        }
+    }
+    between.sort_by(|a, b| a.at[longest].total_cmp(&b.at[longest]));
+    for s in between {
+        sum += s.left as usize;
+        // Both get some.
+        if sum <= aim || near.is_empty() { near.push(s) } else { far.push(s) }
+    }
+    *region = near;
+    far
 }
 
 /// Numbers by a key below `keys`, equals as they were. O(n + keys).
@@ -401,53 +451,57 @@ pub(super) fn labels(base: &[u32]) -> Vec<Label> {
     labels
 }
 
-/// Makes the order, chunk by chunk.
+/// Makes the order, chunk by chunk. Splits go by where they stand among the nodes.
 struct Schedule<'a> {
     nodes: Vec<Node>,
-    further: Option<&'a Further>,
+    splits: &'a [u32],
+    /// And where each split stands.
+    further: Option<(&'a Further, Vec<u32>)>,
+    /// The chunk of each that is in one.
+    chunk: Vec<u32>,
     /// The splits that are in the order.
     done: Vec<bool>,
     order: Vec<u32>,
 }
 
 impl Schedule<'_> {
-    /// True if split `i` is in a chunk.
-    fn has(&self, i: u32) -> bool {
-        self.nodes[i as usize].chunk != NONE
-    }
-
-    /// The vertex of the start of its band that split `i` descends from.
-    fn root(&self, i: u32) -> u32 {
-        self.nodes[i as usize].root
+    /// How many of these are in no chunk.
+    fn left(&self, range: std::ops::Range<u32>) -> u32 {
+        let chunks = self.chunk.get(range.start as usize..range.end as usize).unwrap_or_default();
+        chunks.iter().filter(|&&c| c == NONE).count() as u32
     }
 
     /// Puts a split, and all it depends on that is in no chunk yet, into chunk `number`.
     fn take(&mut self, i: u32, number: u32, taken: &mut Vec<u32>) {
         let mut at = taken.len();
-        if self.has(i) {
+        if self.chunk[i as usize] != NONE {
             return;
         }
-        self.nodes[i as usize].chunk = number;
+        self.chunk[i as usize] = number;
         taken.push(i);
         while let Some(&i) = taken.get(at) {
             at += 1;
-            let (on, further) = (self.nodes[i as usize].on, self.further.map_or(&[][..], |f| f.of(i)));
-            for &d in on.iter().chain(further) {
-                if let Some(node) = self.nodes.get_mut(d as usize).filter(|node| node.chunk == NONE) {
-                    node.chunk = number;
+            let mut one = |d: u32| {
+                if let Some(chunk) = self.chunk.get_mut(d as usize).filter(|chunk| **chunk == NONE) {
+                    *chunk = number;
                     taken.push(d);
                 }
+            };
+            self.nodes[i as usize].on.into_iter().for_each(&mut one);
+            if let Some((further, place)) = &self.further {
+                let needs = further.of(self.splits[i as usize]).iter();
+                needs.filter_map(|&d| place.get(d as usize)).for_each(|&d| one(d));
             }
         }
     }
 
     /// Appends the splits of chunk `number`.
     fn add(&mut self, taken: &[u32], number: u32) {
-        let here = |nodes: &[Node], i: u32| nodes.get(i as usize).is_some_and(|node| node.chunk == number);
+        let here = |i: u32| self.chunk.get(i as usize) == Some(&number);
         let mut roots: Vec<(u32, u32)> = Vec::new();
         for &i in taken {
             let node = &self.nodes[i as usize];
-            if !here(&self.nodes, node.on[0]) {
+            if !here(node.on[0]) {
                 roots.push((node.vertex, i));
             }
         }
@@ -463,13 +517,13 @@ impl Schedule<'_> {
             while let Some(i) = pass.pop() {
                 let node = self.nodes[i as usize];
                 // What is in chunks before this one has been done.
-                if node.on.into_iter().any(|d| here(&self.nodes, d) && !self.done[d as usize]) {
+                if node.on.into_iter().any(|d| here(d) && !self.done[d as usize]) {
                     list.push(i);
                     continue;
                 }
                 self.done[i as usize] = true;
-                self.order.push(i);
-                list.extend([node.again, node.first].into_iter().filter(|&i| here(&self.nodes, i)));
+                self.order.push(self.splits[i as usize]);
+                list.extend([node.again, node.first].into_iter().filter(|&i| here(i)));
             }
         }
     }

@@ -137,9 +137,11 @@ impl Source<'_> {
     /// The next split.
     pub(super) fn wanted(&self) -> Wanted {
         let (s, i) = (&self.pm.splits, self.at.split);
-        let [left, right] = [s.left[i], s.right[i]].map(|c| self.numbers.map_or(c, |n| n.cut(c)));
-        let vertex = self.numbers.map_or(s.vertex[i], |n| n.vertex(s.vertex[i]));
-        Wanted { vertex, left, right, code: s.code[i] }
+        let (vertex, left, right, code) = (s.vertex[i], s.left[i], s.right[i], s.code[i]);
+        match self.numbers {
+            Some(n) => Wanted { vertex: n.vertex(vertex), left: n.cut(left), right: n.cut(right), code },
+            None => Wanted { vertex, left, right, code },
+        }
     }
 }
 

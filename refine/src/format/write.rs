@@ -251,9 +251,11 @@ fn encode_mesh(
         None => None,
     };
     let layout = if ordered { layout.before_order() } else { layout };
-    let plan = Plan::new(source, layout, further.as_ref())?;
+    let on = source.dependencies();
+    let plan = Plan::new(source, &on, layout, further.as_ref())?;
     let further = further.map(|f| f.reordered(&plan.order));
-    let mut pm = source.reordered(&plan.order).ok()?;
+    let mut pm = source.reordered_given(&plan.order, &on).ok()?;
+    drop(on);
     if options.any_order {
         input_order::sort_base(&mut pm);
     }
@@ -302,10 +304,11 @@ fn encode_mesh(
         p
     };
     let jobs = plan.pieces.iter().zip(starts.windows(2));
+    let mut streams = codec::Streams::default();
     let splits: Option<Vec<Part>> = if options.sequential {
         let mut state = Sequel::new(&head, head.start.take()?);
         let one = |(piece, ends): (&Piece, &[Counts])| {
-            let bytes = codec::write(&head, &pm, &mut state, (ends[0], piece.count), None)?;
+            let bytes = codec::write(&head, &pm, &mut state, (ends[0], piece.count), None, &mut streams)?;
             Some(pack(piece, ends, ChunkType::SEQUEL, bytes))
         };
         jobs.map(one).collect()
@@ -317,7 +320,8 @@ fn encode_mesh(
         let one = |(piece, ends): (&Piece, &[Counts])| {
             let mut state = Sequel::new(&head, head.start.take()?);
             sources.find(ends[0].split..ends[1].split);
-            let bytes = codec::write(&head, &pm, &mut state, (ends[0], piece.count), Some(&mut sources))?;
+            let at = (ends[0], piece.count);
+            let bytes = codec::write(&head, &pm, &mut state, at, Some(&mut sources), &mut streams)?;
             head.start.give(state);
             Some(pack(piece, ends, ChunkType::SPLITS, bytes))
         };

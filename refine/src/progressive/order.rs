@@ -48,6 +48,15 @@ impl ProgressiveMesh {
     ///
     /// Errors: `order` is no permutation of the splits, or puts one before one it depends on.
     pub fn reordered(&self, order: &[u32]) -> Result<ProgressiveMesh, NotInOrder> {
+        self.reordered_given(order, &self.dependencies())
+    }
+
+    /// The same, given [`ProgressiveMesh::dependencies`].
+    pub(crate) fn reordered_given(
+        &self,
+        order: &[u32],
+        on: &[[u32; 3]],
+    ) -> Result<ProgressiveMesh, NotInOrder> {
         let (s, n) = (&self.splits, self.splits.len());
         let mut rank = vec![NONE; n];
         for (k, &i) in order.iter().enumerate() {
@@ -59,15 +68,22 @@ impl ProgressiveMesh {
         if let Some(missing) = rank.iter().position(|&r| r == NONE) {
             return Err(NotInOrder(missing as u32));
         }
-        for (i, on) in self.dependencies().into_iter().enumerate() {
-            if on.into_iter().any(|d| d != NONE && rank[d as usize] >= rank[i]) {
+        for (i, on) in on.iter().enumerate() {
+            if on.iter().any(|&d| d != NONE && rank[d as usize] >= rank[i]) {
                 return Err(NotInOrder(i as u32));
             }
         }
         // First face and first row of every split, before and after.
         let (m0, n0) = (self.base_faces.len() as u32, self.base_vertices() as u32);
         let faces_of = |i: usize| 1 + s.code[i].two_faces() as u32;
-        let rows = self.rows_of_splits();
+        let rows = if self.wedges.is_some() { self.rows_of_splits() } else { Vec::new() };
+        // Without attributes nothing is listed.
+        let wedges_of = |i: usize| match (rows.get(i), s.code[i].kind()) {
+            (Some(r), _) => r.new,
+            (None, SplitKind::Plain) => 1,
+            (None, SplitKind::Seam) => 2,
+            (None, SplitKind::Explicit) => 0,
+        };
         let base_wedges = self.wedges.as_ref().map_or(n0, |w| w.base_vertex.len() as u32);
         let mut face = vec![0; n];
         let mut wedge = vec![0; n];
@@ -75,13 +91,18 @@ impl ProgressiveMesh {
         for &i in order {
             (face[i as usize], wedge[i as usize]) = (f, w);
             f += faces_of(i as usize);
-            w += rows[i as usize].new;
+            w += wedges_of(i as usize);
         }
-        let mut new_face: Vec<u32> = (0..m0).collect();
-        let mut new_wedge: Vec<u32> = (0..base_wedges).collect();
+        let mut new_face: Vec<u32> = Vec::with_capacity(f as usize);
+        let mut new_wedge: Vec<u32> = Vec::with_capacity(w as usize);
+        new_face.extend(0..m0);
+        new_wedge.extend(0..base_wedges);
         for i in 0..n {
-            new_face.extend((0..faces_of(i)).map(|k| face[i] + k));
-            new_wedge.extend((0..rows[i].new).map(|k| wedge[i] + k));
+            new_face.push(face[i]);
+            if s.code[i].two_faces() {
+                new_face.push(face[i] + 1);
+            }
+            new_wedge.extend((0..wedges_of(i)).map(|k| wedge[i] + k));
         }
         let cut = |c: u32| match new_face.get((c >> 2) as usize) {
             Some(&f) if c != NONE => f << 2 | c & 3,
@@ -93,7 +114,6 @@ impl ProgressiveMesh {
             old.iter().zip(&new_face).for_each(|(&x, &f)| new[f as usize] = x);
             new
         };
-        let pick = |i: &u32| *i as usize;
         let mut out = ProgressiveMesh {
             base_faces: self.base_faces.clone(),
             base_positions: self.base_positions.clone(),
@@ -107,12 +127,18 @@ impl ProgressiveMesh {
             ..Default::default()
         };
         out.levels.dedup();
-        out.splits.vertex = order.iter().map(|i| vertex(s.vertex[pick(i)])).collect();
-        out.splits.left = order.iter().map(|i| cut(s.left[pick(i)])).collect();
-        out.splits.right = order.iter().map(|i| cut(s.right[pick(i)])).collect();
-        out.splits.code = order.iter().map(|i| s.code[pick(i)]).collect();
-        // There may be none.
-        out.splits.error = order.iter().filter_map(|i| s.error.get(pick(i)).copied()).collect();
+        // Splits come from anywhere: what there is of one is put side by side first, and so fetched at once. There may be no errors.
+        let each = s.vertex.iter().zip(&s.left).zip(&s.right).zip(&s.code);
+        let packed: Vec<_> = each.map(|(((&v, &l), &r), &c)| (vertex(v), cut(l), cut(r), c)).collect();
+        out.splits.reserve(n);
+        for &i in order {
+            let (v, l, r, c) = packed[i as usize];
+            out.splits.vertex.push(v);
+            out.splits.left.push(l);
+            out.splits.right.push(r);
+            out.splits.code.push(c);
+        }
+        out.splits.error.extend(order.iter().filter_map(|&i| s.error.get(i as usize)));
         if let Some(streams) = &self.wedges {
             let base = base_wedges as usize;
             let mut values = Vec::with_capacity(streams.rows.len());

@@ -143,8 +143,9 @@ pub(in super::super) struct Sources<'a> {
     names: &'a [[u32; 2]],
     first: u32,
     first_face: u32,
-    /// Splits of the context, ascending; of each split its place there.
+    /// Splits of the context, ascending; a bit for each split, whether it is one; of each that is its place there.
     ids: Vec<u32>,
+    is: Vec<u64>,
     slot: Vec<u32>,
     /// The first face of each, in the mesh of the chunk.
     faces: Vec<u32>,
@@ -159,7 +160,6 @@ impl<'a> Sources<'a> {
         chunks: &'a [u32],
         places: &'a [[f64; 3]],
     ) -> Self {
-        let slot = vec![NONE; on.len()];
         let mut singles = Singles::new(head);
         let mut maker = Vec::with_capacity(2 * on.len());
         for i in 0..on.len() as u32 {
@@ -177,7 +177,8 @@ impl<'a> Sources<'a> {
             first: 0,
             first_face: 0,
             ids: Vec::new(),
-            slot,
+            is: vec![0; on.len().div_ceil(64)],
+            slot: vec![NONE; on.len()],
             faces: Vec::new(),
             maker,
         }
@@ -198,26 +199,36 @@ impl<'a> Sources<'a> {
 
     /// All splits before `range` that those in it depend on.
     pub(in super::super) fn find(&mut self, range: std::ops::Range<usize>) {
-        self.ids.drain(..).for_each(|i| self.slot[i as usize] = NONE);
+        self.is.fill(0);
+        self.ids.clear();
         self.faces.clear();
         self.first = range.start as u32;
         self.first_face = self.head.first_face(self.first);
         let mut at = 0;
-        let before = |d: &u32| *d < range.start as u32;
-        let slot = &mut self.slot;
+        let (on, is) = (self.on, &mut self.is);
         let mut take = |ids: &mut Vec<u32>, on: &[u32; 3]| {
-            for &d in on.iter().filter(|d| before(d)) {
-                if std::mem::replace(&mut slot[d as usize], 0) == NONE {
+            for &d in on.iter().filter(|&&d| (d as usize) < range.start) {
+                let (word, bit) = (&mut is[(d / 64) as usize], 1 << (d % 64));
+                if *word & bit == 0 {
+                    *word |= bit;
                     ids.push(d);
                 }
             }
         };
-        self.on[range.clone()].iter().for_each(|on| take(&mut self.ids, on));
+        on[range.clone()].iter().for_each(|on| take(&mut self.ids, on));
         while let Some(&i) = self.ids.get(at) {
-            take(&mut self.ids, &self.on[i as usize]);
+            take(&mut self.ids, &on[i as usize]);
             at += 1;
         }
-        self.ids.sort_unstable();
+        // Ascending.
+        self.ids.clear();
+        for (&word, first) in self.is.iter().zip((0u32..).step_by(64)) {
+            let mut word = word;
+            while word != 0 {
+                self.ids.push(first + word.trailing_zeros());
+                word &= word - 1;
+            }
+        }
         let mut face = self.head.base_faces;
         let mut singles = Singles::new(self.head);
         for (&i, k) in self.ids.iter().zip(0..) {
@@ -241,13 +252,16 @@ impl<'a> Sources<'a> {
     /// A cut by the number of its face in the mesh of the chunk.
     #[inline]
     pub(in super::super) fn cut(&self, cut: u32) -> u32 {
-        let made = (cut >> 2).checked_sub(self.head.base_faces).filter(|_| cut != NONE);
-        let Some(&maker) = made.and_then(|k| self.maker.get(k as usize)) else { return cut };
-        let (split, second) = (maker >> 1, maker & 1);
-        let face = if split >= self.first {
-            self.faces.last().map_or(0, |&f| (cut >> 2) - self.first_face + f)
+        let face = cut >> 2;
+        if face < self.head.base_faces || cut == NONE {
+            return cut;
+        }
+        // Most are of the chunk itself.
+        let face = if face >= self.first_face {
+            self.faces.last().map_or(0, |&f| face - self.first_face + f)
         } else {
-            self.faces[self.slot[split as usize] as usize] + second
+            let Some(&maker) = self.maker.get((face - self.head.base_faces) as usize) else { return cut };
+            self.faces[self.slot[(maker >> 1) as usize] as usize] + (maker & 1)
         };
         face << 2 | cut & 3
     }

@@ -189,12 +189,15 @@ impl Path<'_> {
             row: base,
             ..Counts::default()
         };
+        let mut streams = codec::Streams::default();
         let mut at = open.splits;
         for &count in counts {
             let (first, end) = (counts_at(at), counts_at(at + count));
             let mut state = Sequel::new(&self.head, self.head.start.take()?);
             sources.find(at..at + count);
-            let bytes = codec::write(&self.head, &self.mesh, &mut state, (first, count), Some(&mut sources))?;
+            let piece = (first, count);
+            let bytes =
+                codec::write(&self.head, &self.mesh, &mut state, piece, Some(&mut sources), &mut streams)?;
             self.head.start.give(state);
             let mut splits = part(ChunkType::SPLITS, true, 0, raw_bytes(&self.head, first, end), bytes);
             let chunk = &mut splits.chunk;
