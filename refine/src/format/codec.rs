@@ -46,7 +46,8 @@ struct Models {
     gap: [Number; 2],
     split: sweep::Split,
     done: [[Bit; 8]; 3],
-    code_same: Bit,
+    code_same: [Bit; 4],
+    turned: [Bit; 2],
     rest_same: Bit,
     rest: Number,
     moves: Bit,
@@ -95,8 +96,10 @@ struct Codec<'a> {
     to_come: Vec<u32>,
     /// Splits that only prepare for those of the chunk.
     preparing: bool,
-    /// What is told of the last split's code, and whether it moved its vertex.
-    last_code: (u32, bool),
+    /// What is told of the code of the last split of each kind, and whether it moved its vertex; kinds are by two faces and an open ring.
+    last_code: [(u32, bool); 4],
+    /// What the vertices did that were visited since the last split of a context.
+    marks: u8,
     /// The least and the largest level, and classes above the least.
     levels: [u16; 2],
     classes: usize,
@@ -125,7 +128,8 @@ impl<'a> Codec<'a> {
             moved: true,
             to_come: Vec::new(),
             preparing: false,
-            last_code: (0, false),
+            last_code: [(0, false); 4],
+            marks: 0,
             levels: [0; 2],
             classes: 0,
             split: first.split as u32,

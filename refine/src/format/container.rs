@@ -6,7 +6,7 @@ use std::fmt;
 pub const MAGIC: [u8; 8] = *b"\x89PMF\r\n\x1A\n";
 
 /// The version this module writes. A reader takes any minor version of its major one.
-pub const VERSION: (u16, u16) = (4, 0);
+pub const VERSION: (u16, u16) = (5, 0);
 
 pub(super) const HEAD: usize = 48;
 pub(super) const ENTRY: usize = 64;

@@ -25,17 +25,16 @@ pub(super) struct Layout {
     shift: f64,
     /// Up to so many splits the mesh is not divided into segments, and its bands are as wide as chunks allow.
     small: usize,
-    /// With these shares of all vertices the last bands begin, the last of all first; the mesh is not divided into segments then.
-    tail: [f64; 2],
+    /// With this share of all vertices the last band begins, and those before evenly between the first and it, each making [`Layout::growth`] vertices of one at most; the mesh is not divided into segments then. 0: otherwise.
+    tail: f64,
 }
 
 /// Parts of the mesh whose bands begin at counts of their own, evenly spread, so that at every time some have just been refined and others are about to
 /// be: the mesh never is much coarser in one part than in another.
 const SEGMENTS: usize = 2;
 
-/// Where the last two bands begin before an order. By `bench/examples/prefixes`, quadric with endpoint placement, the first 10, 25 and 50 % of the bytes have at most 1.07 times the rms of the
-/// method's own mesh on bunny, 1.25 on dragon, 1.15 on igea, 1.33 on horse with its attributes. At 0.66 and 0.24 dragon takes less, but bunny had 2.47 times with a quarter of the bytes.
-const BEFORE_ORDER: [f64; 2] = [0.69, 0.3];
+/// Where the last band begins before an order.
+const BEFORE_ORDER: f64 = 0.64;
 
 impl Layout {
     /// For chunks that are read alone: wide bands, as a chunk repeats what its band builds on. Dragon, igea and a generated scan of 400,000 faces decided: without the order their first 10, 25 and 50 % of the
@@ -43,13 +42,13 @@ impl Layout {
     /// has up to 1.51, the scan 1.81.
     pub(super) fn alone(chunk: Option<u32>) -> Layout {
         let chunk = chunk.unwrap_or(16_384).max(1) as usize;
-        Layout { chunk, growth: 3.4, last: 0.68, shift: 0.3, small: 4 * chunk, tail: [0.0; 2] }
+        Layout { chunk, growth: 3.4, last: 0.68, shift: 0.3, small: 4 * chunk, tail: 0.0 }
     }
 
     /// For chunks that follow each other.
     pub(super) fn sequential(chunk: Option<u32>) -> Layout {
         let chunk = chunk.unwrap_or(8192).max(1) as usize;
-        Layout { chunk, growth: 2.0, last: 0.5, shift: 0.5, small: 0, tail: [0.0; 2] }
+        Layout { chunk, growth: 2.0, last: 0.5, shift: 0.5, small: 0, tail: 0.0 }
     }
 
     /// For a file that ends with the input's order, a third of it: half of the bytes then hold three quarters of the splits.
@@ -59,7 +58,7 @@ impl Layout {
 
     /// Parts into which the mesh is divided.
     fn segments(&self, pm: &ProgressiveMesh) -> usize {
-        if pm.levels.len() > 2 || self.tail[0] > 0.0 || pm.splits.len() <= self.small { 1 } else { SEGMENTS }
+        if pm.levels.len() > 2 || self.tail > 0.0 || pm.splits.len() <= self.small { 1 } else { SEGMENTS }
     }
 
     /// Splits of the first band of `n`.
@@ -69,12 +68,14 @@ impl Layout {
         (eighths * self.chunk).div_ceil(8)
     }
 
-    /// With how many of all vertices of a segment the `k`-th of its bands begins, counted from the last.
-    fn start(&self, pm: &ProgressiveMesh, (segment, all): (usize, usize), k: usize) -> f64 {
-        let [last, before] = self.tail;
+    /// With how many of all vertices of a segment the `k`-th of its bands begins, counted from the last, where the second of all has `first`.
+    fn start(&self, pm: &ProgressiveMesh, (segment, all): (usize, usize), first: usize, k: usize) -> f64 {
         let all = all as f64;
-        if last > 0.0 {
-            return all * if k == 0 { last } else { before * self.growth.powi(1 - k as i32) };
+        if self.tail > 0.0 {
+            let last = all * self.tail;
+            let times = (last / first.max(1) as f64).max(1.0);
+            let steps = (times.ln() / self.growth.ln()).ceil().max(1.0);
+            return last * times.powf(-(k as f64) / steps);
         }
         if pm.splits.len() <= self.small {
             // The last band has two chunks, or makes four vertices of one: half of the bytes are there before its first chunk is.
@@ -340,7 +341,7 @@ fn bands(pm: &ProgressiveMesh, rank: &[u32], layout: Layout, by_bounds: bool) ->
     let least = if n <= layout.small { 1.25 } else { layout.growth.sqrt() };
     let starts: Vec<Vec<f64>> = (0..segments)
         .map(|s| {
-            let starts = (0..64).map(|k| layout.start(pm, (s, all[s]), k));
+            let starts = (0..64).map(|k| layout.start(pm, (s, all[s]), count[s], k));
             starts.take_while(|&at| at > count[s] as f64 * least).collect()
         })
         .collect();

@@ -11,6 +11,7 @@ use super::super::residual::Guess;
 use super::super::splits::{CONNECTIVITY, Counts, PLACES, STREAMS};
 use super::super::walk::{NO_LEVEL, Walk};
 use super::cuts::Wanted;
+use super::sweep::MARKED;
 use super::{CHECKED, Codec, Sequel};
 use crate::aif::NONE;
 use crate::progressive::ProgressiveMesh;
@@ -20,8 +21,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(super) struct Models {
     sources: Number,
     count: Number,
-    /// Whether the split is the one behind the last, by whether that was; if not, how many are between them.
-    next: [Bit; 2],
+    /// Whether the split is the one behind the last, by whether that was, whether a marked vertex was visited since, and whether its vertex is a root; if not, how many are between them.
+    next: [Bit; 8],
     gap: Number,
     /// By how much flatter than long the surroundings are; of the coordinate along which they rise, by how much less they do.
     place: [[Nibble; FLAT]; 2],
@@ -315,9 +316,16 @@ impl Codec<'_> {
             for k in 0..count as usize {
                 let wanted = sources.as_ref().map(|s| s.wanted(pm, part[k]));
                 let own = sources.as_ref().zip(part.get(k));
+                let (v, state) = self.sweep(&mut c[CONNECTIVITY], wanted.map_or(NONE, |w| w.vertex))?;
                 let gap = own.map_or(0, |(s, &i)| s.name(i) - next);
                 let m = &mut self.m.context;
-                near = c[CONNECTIVITY].bit(&mut m.next[near as usize], gap == 0);
+                let class =
+                    near as usize | ((self.marks & MARKED > 0) as usize) << 1 | ((state > 0) as usize) << 2;
+                near = c[CONNECTIVITY].bit(&mut m.next[class], gap == 0);
+                self.marks = 0;
+                if !near {
+                    self.walk.vertices[v as usize].visit |= MARKED;
+                }
                 let gap = if near { 0 } else { c[CONNECTIVITY].number(&mut m.gap, gap as u64) };
                 let id = u32::try_from(gap).ok()?.checked_add(next)?;
                 next = id.checked_add(1)?;
@@ -326,7 +334,6 @@ impl Codec<'_> {
                 if id >= known.first {
                     return None;
                 }
-                let (v, state) = self.sweep(&mut c[CONNECTIVITY], wanted.map_or(NONE, |w| w.vertex))?;
                 let two = !self.singles.is(id);
                 let (code, cuts) = self.cuts(&mut c[CONNECTIVITY], (v, state), two, wanted)?;
                 let guess = self.guess(v, &cuts, false);

@@ -11,7 +11,7 @@ const TOLD: u16 =
     SplitCode::TWO_FACES | SplitCode::MOVES | SplitCode::L_INNER | SplitCode::L_STARTS | SplitCode::R_INNER;
 /// Those that say how corners lie.
 const ARRANGEMENT: u16 = 0x3F;
-/// Beside the code: the ring runs the other way.
+/// Beside the code: the ring runs the other way. Of an open ring, which begins at the border whichever way it is entered, that is a decision of its own.
 const TURNED: u32 = 1 << 16;
 /// Beside the code: the cuts are named, not counted.
 const NAMED: u32 = 1 << 17;
@@ -45,6 +45,9 @@ impl Codec<'_> {
     ) -> Option<(SplitCode, Cuts)> {
         let start = Some(self.walk.start(v)).filter(|&h| h != NONE)?;
         self.walk.ring(v, start, &mut self.ring)?;
+        // At borders codes are others, and each is mostly like the last of its kind.
+        let open = !self.ring.closed;
+        let kind = two as usize | (open as usize) << 1;
         let mut want = None;
         let (mut rest, mut moves) = (0, false);
         let told = if self.preparing { !ARRANGEMENT } else { TOLD };
@@ -57,8 +60,14 @@ impl Codec<'_> {
                 rest |= if want.is_some() { TURNED } else { NAMED };
             }
         }
-        if !c.bit(&mut self.m.code_same, (rest, moves) == self.last_code) {
-            let (last, moved) = self.last_code;
+        let turned = rest & TURNED != 0;
+        if open {
+            rest &= !TURNED;
+        }
+        let (last, moved) = self.last_code[kind];
+        if c.bit(&mut self.m.code_same[kind], (rest, moves) == (last, moved)) {
+            (rest, moves) = (last, moved);
+        } else {
             if !self.preparing {
                 moves = c.bit(&mut self.m.moves, moves);
             }
@@ -67,10 +76,15 @@ impl Codec<'_> {
                 rest = last;
             } else {
                 rest = u32::try_from(c.number(&mut self.m.rest, rest as u64)).ok()?;
+                if open && rest & TURNED != 0 {
+                    return None;
+                }
             }
-            self.last_code = (rest, moves);
+            self.last_code[kind] = (rest, moves);
         }
-        (rest, moves) = self.last_code;
+        if open && rest & NAMED == 0 && c.bit(&mut self.m.turned[two as usize], turned) {
+            rest |= TURNED;
+        }
         let mut code = rest as u16 & !told | if two { SplitCode::TWO_FACES } else { 0 };
         if moves {
             code |= SplitCode::MOVES;

@@ -13,6 +13,8 @@ const SPLIT: u8 = 2;
 const WAITED: u8 = 3;
 const MOST: u8 = 6;
 const DONE: u8 = 7;
+/// Beside what it did: in the chunk that the context is of, splits of others came before the last one of the vertex, and so probably do again.
+pub(super) const MARKED: u8 = 16;
 
 /// So far ahead of the sweep vertices are looked at.
 const AHEAD: usize = 4;
@@ -67,6 +69,7 @@ impl Codec<'_> {
         self.at = 0;
         self.list.clear();
         self.moved = true;
+        self.marks = 0;
         let mut v = self.walk.head;
         for k in 0..roots {
             let mut gap = 0;
@@ -89,7 +92,8 @@ impl Codec<'_> {
                 return None;
             }
             self.walk.changes(v);
-            self.walk.vertices[v as usize].visit = ROOT;
+            let marked = self.preparing && (k == 0 || gap > 0);
+            self.walk.vertices[v as usize].visit = if marked { ROOT | MARKED } else { ROOT };
             self.pass.push(v);
             v = self.walk.next(v);
         }
@@ -117,7 +121,8 @@ impl Codec<'_> {
             }
             let vertex = &mut self.walk.vertices[v as usize];
             let visit = vertex.visit;
-            if visit.wrapping_sub(WAITED) < TOUCHED - WAITED {
+            self.marks |= visit;
+            if (visit & !MARKED).wrapping_sub(WAITED) < TOUCHED - WAITED {
                 // What it waits for would have touched it.
                 self.list.push(v);
                 continue;
@@ -139,7 +144,7 @@ impl Codec<'_> {
             }
             let last = !C::READS && self.to_come.get(v as usize) == Some(&0);
             if state >= WAITED || !c.bit(&mut self.m.done[state as usize][level & 7], last) {
-                vertex.visit = if state < WAITED { WAITED } else { (state + 1).min(MOST) };
+                vertex.visit = visit & MARKED | if state < WAITED { WAITED } else { (state + 1).min(MOST) };
                 self.list.push(v);
             } else {
                 vertex.visit = DONE;
