@@ -1,9 +1,12 @@
 //! Geomorphs: both ends are the two meshes bit for bit, and nothing in between is out of order.
 
+mod common;
+
+use common::{options, with_a_slit};
 use progmesh_meshes::{GenerateOptions, generate};
 use progmesh_refine::aif::*;
 use progmesh_refine::progressive::build;
-use progmesh_refine::simplify::{Method, Options, Quiet};
+use progmesh_refine::simplify::{Method, Options, Placement, Quiet};
 use progmesh_refine::{Cursor, Geomorph, GeomorphError, ProgressiveMesh};
 use proptest::prelude::*;
 
@@ -76,8 +79,8 @@ fn shown(c: &Cursor<&ProgressiveMesh>) -> Vec<([Corner; 3], Option<u32>)> {
     pm.order.as_ref().unwrap().face.iter().map(|&f| input[f as usize].clone()).collect()
 }
 
-/// Everything that is guaranteed of a geomorph between two states.
-fn check(pm: &ProgressiveMesh, one: usize, other: usize) {
+/// The geomorph between two states, of which both ends are the meshes.
+fn with_good_ends(pm: &ProgressiveMesh, one: usize, other: usize) -> Geomorph {
     let (low, high) = (one.min(other), one.max(other));
     let (mut coarse, mut fine) = (pm.cursor().unwrap(), pm.cursor().unwrap());
     coarse.seek(low).unwrap();
@@ -98,7 +101,12 @@ fn check(pm: &ProgressiveMesh, one: usize, other: usize) {
     assert_eq!(kept, (0..g.coarse_faces()).collect::<Vec<_>>());
     let have = faces(&begin);
     assert_eq!(kept.iter().map(|&f| have[f].clone()).collect::<Vec<_>>(), shown(&coarse));
+    g
+}
 
+/// Everything that is guaranteed of a geomorph between two states.
+fn check(pm: &ProgressiveMesh, one: usize, other: usize) {
+    let g = with_good_ends(pm, one, other);
     // Between: within the box of both ends, coordinate by coordinate; normals of unit length.
     for a in [0.25, 0.5, 0.9] {
         let m = g.at(a);
@@ -167,6 +175,34 @@ fn a_vertex_in_the_middle_is_half_way() {
     for v in 0..half.len() {
         assert!((half.get(v) - (p.get(v) + q.get(v)) / 2.0).length() <= 1e-6 * q.get(v).length().max(1.0));
     }
+}
+
+#[test]
+fn where_seams_end_corners_begin_with_what_they_have_there() {
+    let mut parted = 0;
+    for seed in 0..6 {
+        for (method, placement) in [
+            (Method::Quadric, Placement::Endpoint),
+            (Method::Quadric, Placement::Optimal),
+            (Method::Nsa, Placement::Midpoint),
+        ] {
+            let mut o = options(method, Some(placement));
+            o.epsilon = (method == Method::Nsa).then_some(60.0);
+            let pm = build(with_a_slit(seed), &o, &Quiet).unwrap().mesh;
+            let n = pm.splits.len();
+            for pm in [pm.sorted_by_error(), Some(pm)].into_iter().flatten() {
+                for (from, to) in (0..n).step_by(5).flat_map(|a| (a + 1..n).step_by(17).map(move |b| (a, b)))
+                {
+                    let g = with_good_ends(&pm, from, to);
+                    let mut fine = pm.cursor().unwrap();
+                    fine.seek(to).unwrap();
+                    assert_eq!(g.wedge_ancestors().len(), g.at(0.0).wedges.unwrap().len());
+                    parted += g.wedge_ancestors().len() - fine.wedge_count();
+                }
+            }
+        }
+    }
+    assert!(parted > 0);
 }
 
 #[test]
