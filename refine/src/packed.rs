@@ -25,18 +25,21 @@ impl Packed {
         debug_assert!(width <= 64);
         let mask = mask(width);
         let mut p = Packed { width, mask, len: 0, bytes: Vec::new() };
-        // What is not in bytes yet, and how many bits that are.
-        let (mut rest, mut bits) = (0u128, 0);
+        // What is not in bytes yet, and how many bits that are: less than a word.
+        let (mut rest, mut bits) = (0u64, 0);
         for x in numbers {
-            rest |= u128::from(x & mask) << bits;
+            let x = x & mask;
+            rest |= x << bits;
             bits += width;
-            while bits >= 8 {
-                p.bytes.push(rest as u8);
-                (rest, bits) = (rest >> 8, bits - 8);
+            if bits >= u64::BITS {
+                p.bytes.extend_from_slice(&rest.to_le_bytes());
+                bits -= u64::BITS;
+                // What of it is left; nothing if it was a whole word.
+                rest = x.checked_shr(width - bits).unwrap_or(0);
             }
             p.len += 1;
         }
-        p.bytes.push(rest as u8);
+        p.bytes.extend_from_slice(&rest.to_le_bytes()[..bits.div_ceil(8) as usize]);
         p.bytes.extend([0; SPARE]);
         p.bytes.shrink_to_fit();
         p

@@ -178,9 +178,11 @@ impl Rows {
         if 16 * numbered < seen && bytes.is_none() {
             return None;
         }
-        let on = Ranks::new((0..rows).map(|r| directions::number(normal(r)).is_some()));
-        let numbers = (0..rows).filter_map(|r| directions::number(normal(r)));
-        let numbers = Packed::with_width(directions::BITS, numbers.map(u64::from));
+        // Told once, as that takes most of the time; no direction has all bits.
+        let number: Vec<u32> = (0..rows).map(|r| directions::number(normal(r)).unwrap_or(u32::MAX)).collect();
+        let on = Ranks::new(number.iter().map(|&n| n != u32::MAX));
+        let numbered = number.into_iter().filter(|&n| n != u32::MAX);
+        let numbers = Packed::with_width(directions::BITS, numbered.map(u64::from));
         let rest = (0..rows).filter(|&r| !on.get(r as u32)).map(normal);
         let exact = match bytes {
             None => Exact::Plain(shrunk(rest.collect())),
