@@ -230,6 +230,51 @@ fn the_full_end_has_the_signs_of_zeros_that_the_input_has() {
 }
 
 #[test]
+fn all_triangles_of_a_polygon_end_with_the_attributes_of_its_corners() {
+    // Faces have corners with normals of their own that differ in the sign of a zero.
+    let s = generate("polygons", &GenerateOptions::default().with_faces(600).with_seed(2)).unwrap();
+    let mut w = Wedges::new(vec![Channel::new(Semantic::Normal, 3)]).unwrap();
+    for (c, &v) in s.corners.iter().enumerate() {
+        let zero = if c % 3 == 0 { -0.0 } else { 0.0 };
+        w.corner.push(w.len() as u32);
+        w.push(&[zero, (v % 5) as f32, 1.0], 1);
+    }
+    let input = MeshInput {
+        positions: Positions::from_f64(s.positions.clone()),
+        face_sizes: s.face_sizes.clone(),
+        corners: s.corners.clone(),
+        wedges: Some(w),
+        ..Default::default()
+    };
+    let mesh = Mesh::build(input, &BuildOptions::default()).unwrap().0;
+    let pm = build(mesh, &Options::default(), &Quiet).unwrap().mesh;
+    let order = pm.order.as_ref().unwrap();
+    assert!(!order.corner_wedges.is_empty() || !order.rows.is_empty());
+    let mut cursor = pm.cursor().unwrap();
+    cursor.seek(usize::MAX).unwrap();
+    let (input, polygons) = (cursor.to_ordered_input(), order.polygons.as_ref().unwrap());
+    let shown = |m: &MeshInput, c: usize| {
+        let w = m.wedges.as_ref().unwrap();
+        let row: Vec<u32> = w.row(w.corner[c]).iter().map(|x| x.to_bits()).collect();
+        (m.positions.get(m.corners[c] as usize).to_array().map(f64::to_bits), row)
+    };
+    let end = Geomorph::new(&pm, pm.splits.len() / 2, usize::MAX).unwrap().at(1.0);
+    let mut slot = vec![0; order.face.len()];
+    order.face.iter().enumerate().for_each(|(s, &f)| slot[f as usize] = s);
+    let (mut at, mut first) = (0, 0);
+    for &size in &polygons.sizes {
+        let want: Vec<_> = (at..at + size as usize).map(|c| shown(&input, c)).collect();
+        for f in first..first + size as usize - 2 {
+            for k in 0..3 {
+                assert!(want.contains(&shown(&end, 3 * slot[f] + k)), "{f} {k}");
+            }
+        }
+        (at, first) = (at + size as usize, first + size as usize - 2);
+    }
+    assert_eq!(first, slot.len());
+}
+
+#[test]
 fn states_of_different_meshes_are_refused() {
     let pm = |seed| build(mesh("scan", 300, seed), &Options::default(), &Quiet).unwrap().mesh;
     let (a, b, c) = (pm(1), pm(2), pm(1));
