@@ -164,16 +164,17 @@ pub(crate) struct Ranks {
 impl Ranks {
     pub(crate) fn new(all: impl Iterator<Item = bool>) -> Ranks {
         let mut r = Ranks::default();
-        for (i, bit) in all.enumerate() {
-            if i % 64 == 0 {
-                r.bits.push(0);
-                r.before.push(r.set);
+        let (mut word, mut at) = (0u64, 0);
+        for bit in all {
+            word |= u64::from(bit) << at;
+            at += 1;
+            if at == u64::BITS {
+                r.push(word, at);
+                (word, at) = (0, 0);
             }
-            r.len += 1;
-            if bit {
-                r.bits[i / 64] |= 1 << (i % 64);
-                r.set += 1;
-            }
+        }
+        if at > 0 {
+            r.push(word, at);
         }
         if r.set == 0 || r.set == r.len {
             return Ranks { set: r.set, len: r.len, ..Ranks::default() };
@@ -181,6 +182,13 @@ impl Ranks {
         r.bits.shrink_to_fit();
         r.before.shrink_to_fit();
         r
+    }
+
+    fn push(&mut self, word: u64, bits: u32) {
+        self.bits.push(word);
+        self.before.push(self.set);
+        self.set += word.count_ones();
+        self.len += bits;
     }
 
     /// None is set.
