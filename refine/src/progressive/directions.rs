@@ -96,8 +96,12 @@ impl Unit {
 
     /// With so many bytes for the third; `None` if it does not fit.
     pub(super) fn new(n: [f32; 3], bytes: usize) -> Option<Unit> {
-        let axis = (0..3).max_by(|&a, &b| n[a].abs().total_cmp(&n[b].abs()))?;
-        let two = [n[(axis + 1) % 3], n[(axis + 2) % 3]];
+        let [x, y, z] = n.map(f32::abs);
+        let (axis, two) = match () {
+            _ if z >= x && z >= y => (2, [n[0], n[1]]),
+            _ if y >= x => (1, [n[2], n[0]]),
+            _ => (0, [n[1], n[2]]),
+        };
         if !two.iter().all(|x| x.abs() < 2.0) {
             return None;
         }

@@ -149,11 +149,12 @@ impl InputOrder {
 
 /// All wedges of `part` are those of `all`, bit for bit, and at the same corners.
 fn is_part_of(part: &Wedges, all: &Wedges) -> bool {
-    let same = |w: u32| {
-        part.present(w) == all.present(w)
-            && part.row(w).iter().zip(all.row(w)).all(|(a, b)| a.to_bits() == b.to_bits())
-    };
-    part.len() <= all.len() && part.corner == all.corner && (0..part.len() as u32).all(same)
+    // All of them, without a branch for each.
+    let bits = part.rows().iter().zip(all.rows()).fold(0, |d, (a, b)| d | (a.to_bits() ^ b.to_bits()));
+    part.len() <= all.len()
+        && bits == 0
+        && part.corner == all.corner
+        && (0..part.len() as u32).all(|w| part.present(w) == all.present(w))
 }
 
 fn same_wedge(a: &MeshInput, x: u32, b: &MeshInput, y: u32) -> bool {

@@ -342,7 +342,7 @@ fn append(values: &mut Vec<f32>, row: &[f32]) {
 }
 
 /// Appends the row of wedge `w`.
-#[inline]
+#[inline(always)]
 fn push_row(
     (present, values): (&mut Presence, &mut Vec<f32>),
     wedges: &Wedges,

@@ -180,7 +180,7 @@ impl Rows {
         }
         let (mut numbers, mut rest) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
         let on = Ranks::new(values.chunks_exact(stride).map(|row| {
-            let n = [row[at], row[at + 1], row[at + 2]];
+            let n = row[at..].first_chunk().copied().unwrap_or_default();
             let number = directions::number(n);
             match number {
                 Some(k) => numbers.push(k),
