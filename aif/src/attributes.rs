@@ -182,6 +182,11 @@ impl Wedges {
         &self.values[w * self.stride..(w + 1) * self.stride]
     }
 
+    /// The rows of all wedges, one after the other.
+    pub fn rows(&self) -> &[f32] {
+        &self.values
+    }
+
     /// The row of wedge `w`, to change.
     #[inline]
     pub fn row_mut(&mut self, w: u32) -> &mut [f32] {

@@ -144,15 +144,29 @@ impl Geomorph {
         let mut attributes =
             pm.wedges.as_ref().map(|w| Ends::new(w.channels.clone(), &coarse, &cursor, &wedge_ancestors));
         let mut faces = cursor.indices().to_vec();
-        if let (Some(ends), Some((input, corners))) = (&mut attributes, cursor.corrections()) {
-            let apart = coarse.position() != cursor.position();
+        if let Some(ends) = &mut attributes {
             let mut made = FxHashMap::default();
-            for (f, k, w) in corners {
-                let slot = faces[f][k];
-                faces[f][k] = *made.entry((slot, w)).or_insert_with(|| {
-                    wedge_ancestors.push(wedge_ancestors[slot as usize]);
-                    ends.correct(slot, &input, w, apart)
-                });
+            // A split that brings one wedge may give it to corners that had several: where a seam ends.
+            for (face, before) in faces.iter_mut().zip(coarse.indices()) {
+                for (w, &from) in face.iter_mut().zip(before) {
+                    if wedge_ancestors[*w as usize] != from {
+                        *w = *made.entry((*w, from)).or_insert_with(|| {
+                            wedge_ancestors.push(from);
+                            ends.part(*w, coarse.row(from), coarse.present(from))
+                        });
+                    }
+                }
+            }
+            let apart = coarse.position() != cursor.position();
+            made.clear();
+            for (input, corners) in cursor.corrections().iter() {
+                for &(f, k, w) in corners {
+                    let slot = faces[f][k];
+                    faces[f][k] = *made.entry((slot, w)).or_insert_with(|| {
+                        wedge_ancestors.push(wedge_ancestors[slot as usize]);
+                        ends.correct(slot, input, w, apart)
+                    });
+                }
             }
         }
         Ok(Geomorph {
@@ -181,7 +195,7 @@ impl Geomorph {
         &self.vertex_ancestors
     }
 
-    /// For every wedge of the finer mesh the one it comes from in the coarser; at full detail there may be a few more than splits make.
+    /// For every wedge of the finer mesh the one it comes from in the coarser; there may be a few more than splits make, where seams end.
     pub fn wedge_ancestors(&self) -> &[u32] {
         &self.wedge_ancestors
     }
@@ -236,6 +250,17 @@ impl Ends {
             start_present.push(coarse.present(from));
         }
         Ends { mix: Mix::new(&channels), start, end, start_present, end_present }
+    }
+
+    /// Adds a wedge that begins as this row, and ends as wedge `slot`. Returns its number.
+    fn part(&mut self, slot: u32, row: &[f32], present: u64) -> u32 {
+        let (stride, new) = (self.mix.stride, self.end_present.len() as u32);
+        let s = slot as usize;
+        self.start.extend_from_slice(row);
+        self.start_present.push(present);
+        self.end.extend_from_within(s * stride..(s + 1) * stride);
+        self.end_present.push(self.end_present[s]);
+        new
     }
 
     /// Adds a wedge that ends as wedge `w` of the input ([`NONE`]: without attributes), and begins as wedge `slot`, or does not change. Returns its number.

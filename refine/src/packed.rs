@@ -25,18 +25,21 @@ impl Packed {
         debug_assert!(width <= 64);
         let mask = mask(width);
         let mut p = Packed { width, mask, len: 0, bytes: Vec::new() };
-        // What is not in bytes yet, and how many bits that are.
-        let (mut rest, mut bits) = (0u128, 0);
+        // What is not in bytes yet, and how many bits that are: less than a word.
+        let (mut rest, mut bits) = (0u64, 0);
         for x in numbers {
-            rest |= u128::from(x & mask) << bits;
+            let x = x & mask;
+            rest |= x << bits;
             bits += width;
-            while bits >= 8 {
-                p.bytes.push(rest as u8);
-                (rest, bits) = (rest >> 8, bits - 8);
+            if bits >= u64::BITS {
+                p.bytes.extend_from_slice(&rest.to_le_bytes());
+                bits -= u64::BITS;
+                // What of it is left; nothing if it was a whole word.
+                rest = x.checked_shr(width - bits).unwrap_or(0);
             }
             p.len += 1;
         }
-        p.bytes.push(rest as u8);
+        p.bytes.extend_from_slice(&rest.to_le_bytes()[..bits.div_ceil(8) as usize]);
         p.bytes.extend([0; SPARE]);
         p.bytes.shrink_to_fit();
         p
@@ -161,16 +164,17 @@ pub(crate) struct Ranks {
 impl Ranks {
     pub(crate) fn new(all: impl Iterator<Item = bool>) -> Ranks {
         let mut r = Ranks::default();
-        for (i, bit) in all.enumerate() {
-            if i % 64 == 0 {
-                r.bits.push(0);
-                r.before.push(r.set);
+        let (mut word, mut at) = (0u64, 0);
+        for bit in all {
+            word |= u64::from(bit) << at;
+            at += 1;
+            if at == u64::BITS {
+                r.push(word, at);
+                (word, at) = (0, 0);
             }
-            r.len += 1;
-            if bit {
-                r.bits[i / 64] |= 1 << (i % 64);
-                r.set += 1;
-            }
+        }
+        if at > 0 {
+            r.push(word, at);
         }
         if r.set == 0 || r.set == r.len {
             return Ranks { set: r.set, len: r.len, ..Ranks::default() };
@@ -178,6 +182,13 @@ impl Ranks {
         r.bits.shrink_to_fit();
         r.before.shrink_to_fit();
         r
+    }
+
+    fn push(&mut self, word: u64, bits: u32) {
+        self.bits.push(word);
+        self.before.push(self.set);
+        self.set += word.count_ones();
+        self.len += bits;
     }
 
     /// None is set.

@@ -1,9 +1,12 @@
 //! Geomorphs: both ends are the two meshes bit for bit, and nothing in between is out of order.
 
+mod common;
+
+use common::{options, with_a_slit};
 use progmesh_meshes::{GenerateOptions, generate};
 use progmesh_refine::aif::*;
 use progmesh_refine::progressive::build;
-use progmesh_refine::simplify::{Method, Options, Quiet};
+use progmesh_refine::simplify::{Method, Options, Placement, Quiet};
 use progmesh_refine::{Cursor, Geomorph, GeomorphError, ProgressiveMesh};
 use proptest::prelude::*;
 
@@ -76,8 +79,8 @@ fn shown(c: &Cursor<&ProgressiveMesh>) -> Vec<([Corner; 3], Option<u32>)> {
     pm.order.as_ref().unwrap().face.iter().map(|&f| input[f as usize].clone()).collect()
 }
 
-/// Everything that is guaranteed of a geomorph between two states.
-fn check(pm: &ProgressiveMesh, one: usize, other: usize) {
+/// The geomorph between two states, of which both ends are the meshes.
+fn with_good_ends(pm: &ProgressiveMesh, one: usize, other: usize) -> Geomorph {
     let (low, high) = (one.min(other), one.max(other));
     let (mut coarse, mut fine) = (pm.cursor().unwrap(), pm.cursor().unwrap());
     coarse.seek(low).unwrap();
@@ -98,7 +101,12 @@ fn check(pm: &ProgressiveMesh, one: usize, other: usize) {
     assert_eq!(kept, (0..g.coarse_faces()).collect::<Vec<_>>());
     let have = faces(&begin);
     assert_eq!(kept.iter().map(|&f| have[f].clone()).collect::<Vec<_>>(), shown(&coarse));
+    g
+}
 
+/// Everything that is guaranteed of a geomorph between two states.
+fn check(pm: &ProgressiveMesh, one: usize, other: usize) {
+    let g = with_good_ends(pm, one, other);
     // Between: within the box of both ends, coordinate by coordinate; normals of unit length.
     for a in [0.25, 0.5, 0.9] {
         let m = g.at(a);
@@ -170,6 +178,34 @@ fn a_vertex_in_the_middle_is_half_way() {
 }
 
 #[test]
+fn where_seams_end_corners_begin_with_what_they_have_there() {
+    let mut parted = 0;
+    for seed in 0..6 {
+        for (method, placement) in [
+            (Method::Quadric, Placement::Endpoint),
+            (Method::Quadric, Placement::Optimal),
+            (Method::Nsa, Placement::Midpoint),
+        ] {
+            let mut o = options(method, Some(placement));
+            o.epsilon = (method == Method::Nsa).then_some(60.0);
+            let pm = build(with_a_slit(seed), &o, &Quiet).unwrap().mesh;
+            let n = pm.splits.len();
+            for pm in [pm.sorted_by_error(), Some(pm)].into_iter().flatten() {
+                for (from, to) in (0..n).step_by(5).flat_map(|a| (a + 1..n).step_by(17).map(move |b| (a, b)))
+                {
+                    let g = with_good_ends(&pm, from, to);
+                    let mut fine = pm.cursor().unwrap();
+                    fine.seek(to).unwrap();
+                    assert_eq!(g.wedge_ancestors().len(), g.at(0.0).wedges.unwrap().len());
+                    parted += g.wedge_ancestors().len() - fine.wedge_count();
+                }
+            }
+        }
+    }
+    assert!(parted > 0);
+}
+
+#[test]
 fn the_full_end_has_the_signs_of_zeros_that_the_input_has() {
     let mut input = mesh("torus", 600, 1).to_input();
     // At some corners a copy of their wedge with another sign of a zero: the same number, which no split tells apart.
@@ -191,6 +227,52 @@ fn the_full_end_has_the_signs_of_zeros_that_the_input_has() {
         assert_eq!(g.wedge_ancestors().len(), g.at(0.5).wedges.unwrap().len());
         check(&pm, from, n);
     }
+}
+
+#[test]
+fn all_triangles_of_a_polygon_end_with_the_attributes_of_its_corners() {
+    // Faces have corners with normals of their own that differ in the sign of a zero.
+    let s = generate("polygons", &GenerateOptions::default().with_faces(600).with_seed(2)).unwrap();
+    let mut w = Wedges::new(vec![Channel::new(Semantic::Normal, 3)]).unwrap();
+    for (c, &v) in s.corners.iter().enumerate() {
+        let zero = if c % 3 == 0 { -0.0 } else { 0.0 };
+        w.corner.push(w.len() as u32);
+        w.push(&[zero, (v % 5) as f32, 1.0], 1);
+    }
+    let input = MeshInput {
+        positions: Positions::from_f64(s.positions.clone()),
+        face_sizes: s.face_sizes.clone(),
+        corners: s.corners.clone(),
+        wedges: Some(w),
+        ..Default::default()
+    };
+    let mesh = Mesh::build(input, &BuildOptions::default()).unwrap().0;
+    let pm = build(mesh, &Options::default(), &Quiet).unwrap().mesh;
+    let order = pm.order.as_ref().unwrap();
+    assert!(!order.corner_wedges.is_empty() || !order.rows.is_empty());
+    let mut cursor = pm.cursor().unwrap();
+    cursor.seek(usize::MAX).unwrap();
+    let (input, polygons) = (cursor.to_ordered_input(), order.polygons.as_ref().unwrap());
+    let shown = |m: &MeshInput, c: usize| {
+        let w = m.wedges.as_ref().unwrap();
+        let row: Vec<u32> = w.row(w.corner[c]).iter().map(|x| x.to_bits()).collect();
+        (m.positions.get(m.corners[c] as usize).to_array().map(f64::to_bits), row)
+    };
+    let end = Geomorph::new(&pm, pm.splits.len() / 2, usize::MAX).unwrap().at(1.0);
+    let mut slot = vec![0; order.face.len()];
+    order.face.iter().enumerate().for_each(|(s, &f)| slot[f as usize] = s);
+    let (mut at, mut first) = (0, 0);
+    for &size in &polygons.sizes {
+        let want: Vec<_> = (at..at + size as usize).map(|c| shown(&input, c)).collect();
+        let beyond = first + size as usize - 2;
+        for &f in &slot[first..beyond] {
+            for k in 0..3 {
+                assert!(want.contains(&shown(&end, 3 * f + k)), "{f} {k}");
+            }
+        }
+        (at, first) = (at + size as usize, beyond);
+    }
+    assert_eq!(first, slot.len());
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::{Cursor, ProgressiveMesh};
 use crate::aif::{MeshInput, NONE, Positions, Wedges};
 use rustc_hash::FxHashMap;
+use std::borrow::Cow;
 use std::ops::Deref;
 
 /// The input's numbering, and what triangles do not tell of it.
@@ -80,10 +81,16 @@ impl InputOrder {
         self.polygons = Some(Polygons { sizes: sizes.clone(), corners });
     }
 
+    /// The slot of every face of the input.
+    fn face_slots(&self) -> Vec<u32> {
+        let mut slot = vec![0; self.face.len()];
+        self.face.iter().enumerate().for_each(|(s, &f)| slot[f as usize] = s as u32);
+        slot
+    }
+
     /// Where the triangles' corners that make the input's corners are in the index buffer at full detail, one after the other.
     fn corner_slots(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let mut slot = vec![0u32; self.face.len()];
-        self.face.iter().enumerate().for_each(|(s, &f)| slot[f as usize] = s as u32);
+        let slot = self.face_slots();
         let n = self.polygons.as_ref().map_or(3 * slot.len(), |p| p.corners.len());
         (0..n).map(move |c| {
             let c = self.polygons.as_ref().map_or(c, |p| p.corners[c] as usize);
@@ -142,11 +149,12 @@ impl InputOrder {
 
 /// All wedges of `part` are those of `all`, bit for bit, and at the same corners.
 fn is_part_of(part: &Wedges, all: &Wedges) -> bool {
-    let same = |w: u32| {
-        part.present(w) == all.present(w)
-            && part.row(w).iter().zip(all.row(w)).all(|(a, b)| a.to_bits() == b.to_bits())
-    };
-    part.len() <= all.len() && part.corner == all.corner && (0..part.len() as u32).all(same)
+    // All of them, without a branch for each.
+    let bits = part.rows().iter().zip(all.rows()).fold(0, |d, (a, b)| d | (a.to_bits() ^ b.to_bits()));
+    part.len() <= all.len()
+        && bits == 0
+        && part.corner == all.corner
+        && (0..part.len() as u32).all(|w| part.present(w) == all.present(w))
 }
 
 fn same_wedge(a: &MeshInput, x: u32, b: &MeshInput, y: u32) -> bool {
@@ -238,10 +246,44 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
                     && self.row(s).iter().zip(wedges.row(w)).all(|(a, b)| a.to_bits() == b.to_bits())
             }
         };
-        let corners = order.corner_slots().zip(&wedges.corner);
-        let others = corners.filter(|&((f, k), &w)| !same(self.indices()[f][k], w));
+        let corner = match &order.polygons {
+            None => Cow::Borrowed(&wedges.corner[..]),
+            Some(p) => Cow::Owned(self.triangle_wedges(order, p, &wedges)),
+        };
+        let corners = order.face_slots().into_iter().flat_map(|f| (0..3).map(move |k| (f as usize, k)));
+        let others = corners.zip(corner.iter()).filter(|&((f, k), &w)| !same(self.indices()[f][k], w));
         let others = others.map(|((f, k), &w)| (f, k, w)).collect();
         Some((wedges, others))
+    }
+
+    /// The wedges of the polygons' corners, by corners of their triangles. O(n).
+    fn triangle_wedges(&self, order: &InputOrder, p: &Polygons, wedges: &Wedges) -> Vec<u32> {
+        let faces = order.face_slots();
+        let slot = |c: usize| self.indices()[faces[c / 3] as usize][c % 3];
+        let mut out = vec![NONE; 3 * faces.len()];
+        let (mut of_slot, mut of_vertex) = (FxHashMap::default(), FxHashMap::default());
+        let (mut at, mut first) = (0, 0);
+        for &size in &p.sizes {
+            // A polygon of n corners was cut into n - 2 triangles, which follow each other. Of their corners n are named; the others are the same by
+            // their slot, or at least at the same vertex.
+            let named = at..at + size as usize;
+            let named = p.corners[named.clone()].iter().map(|&c| c as usize).zip(&wedges.corner[named]);
+            let end = out.len().min(first + 3 * (size as usize).saturating_sub(2));
+            of_slot.clear();
+            of_vertex.clear();
+            for (c, &w) in named.clone() {
+                of_slot.insert(slot(c), w);
+                of_vertex.insert(self.wedge_vertex(slot(c)), w);
+            }
+            for (c, out) in out[first..end].iter_mut().enumerate() {
+                let s = slot(first + c);
+                let same = of_slot.get(&s).or_else(|| of_vertex.get(&self.wedge_vertex(s)));
+                *out = same.copied().unwrap_or(NONE);
+            }
+            named.for_each(|(c, &w)| out[c] = w);
+            (at, first) = (at + size as usize, end);
+        }
+        out
     }
 
     /// The wedges of the input; `have` holds those of full detail, by slot.

@@ -34,7 +34,7 @@ struct OnGrid {
 }
 
 /// Points looked at to find whether there is a grid.
-const SAMPLES: usize = 2000;
+const SAMPLES: usize = 500;
 
 impl Default for Places {
     fn default() -> Self {

@@ -57,7 +57,7 @@ impl<'a> WedgeReplay<'a> {
                     slot[w as usize] = count;
                     count += 1;
                     out.base_vertex.push(0);
-                    values.extend_from_slice(wedges.row(w));
+                    append(&mut values, wedges.row(w));
                     out.present.push(wedges.present(w));
                 }
                 out.base_vertex[slot[w as usize] as usize] = vertex(v);
@@ -332,15 +332,24 @@ impl Between {
     }
 }
 
-/// Appends the row of wedge `w`.
+/// Appends a row: those of three numbers, a normal as a rule, without a call.
 #[inline]
+fn append(values: &mut Vec<f32>, row: &[f32]) {
+    match *row {
+        [x, y, z] => values.extend_from_slice(&[x, y, z]),
+        _ => values.extend_from_slice(row),
+    }
+}
+
+/// Appends the row of wedge `w`.
+#[inline(always)]
 fn push_row(
     (present, values): (&mut Presence, &mut Vec<f32>),
     wedges: &Wedges,
     between: &Option<Between>,
     w: u32,
 ) {
-    values.extend_from_slice(wedges.row(w));
+    append(values, wedges.row(w));
     if let Some(b) = between.as_ref().filter(|b| b.left[w as usize] > 0) {
         let end = values.len() - wedges.stride() + b.at;
         if let [x, y, z, ..] = &mut values[end..] {

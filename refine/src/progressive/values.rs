@@ -44,7 +44,7 @@ enum Exact {
 }
 
 /// Normals looked at to find whether packing spares anything.
-const SAMPLES: usize = 2000;
+const SAMPLES: usize = 500;
 
 impl Default for Values {
     fn default() -> Self {
@@ -178,28 +178,42 @@ impl Rows {
         if 16 * numbered < seen && bytes.is_none() {
             return None;
         }
-        let on = Ranks::new((0..rows).map(|r| directions::number(normal(r)).is_some()));
-        let numbers = (0..rows).filter_map(|r| directions::number(normal(r)));
-        let numbers = Packed::with_width(directions::BITS, numbers.map(u64::from));
-        let rest = (0..rows).filter(|&r| !on.get(r as u32)).map(normal);
+        let (mut numbers, mut rest) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
+        let on = Ranks::new(values.chunks_exact(stride).map(|row| {
+            let n = row[at..].first_chunk().copied().unwrap_or_default();
+            let number = directions::number(n);
+            match number {
+                Some(k) => numbers.push(k),
+                None => rest.push(n),
+            }
+            number.is_some()
+        }));
+        let numbers = Packed::with_width(directions::BITS, numbers.into_iter().map(u64::from));
         let exact = match bytes {
-            None => Exact::Plain(shrunk(rest.collect())),
+            None => Exact::Plain(shrunk(rest)),
             Some(bytes) => {
-                let (mut two, mut third, mut escapes) = (Vec::new(), Vec::new(), Vec::new());
+                let (mut two, mut third) = (Vec::with_capacity(rest.len()), Vec::with_capacity(rest.len()));
+                let mut escapes = Vec::new();
                 for (k, n) in (0u32..).zip(rest) {
                     let unit = Unit::new(n, bytes).unwrap_or_else(|| {
                         escapes.push((k, n));
                         Unit::ESCAPE
                     });
                     two.push(unit.two);
-                    third.push(unit.third);
+                    third.push(u64::from(unit.third));
                 }
-                let third = Packed::with_width(8 * bytes as u32, third.into_iter().map(u64::from));
-                Exact::Unit { two: shrunk(two), third, escapes: shrunk(escapes) }
+                let third = Packed::with_width(8 * bytes as u32, third.into_iter());
+                Exact::Unit { two, third, escapes: shrunk(escapes) }
             }
         };
-        let others =
-            values.chunks_exact(stride).flat_map(|r| r[..at].iter().chain(&r[at + 3..])).copied().collect();
+        let others = match stride {
+            3 => Vec::new(),
+            _ => values
+                .chunks_exact(stride)
+                .flat_map(|r| r[..at].iter().chain(&r[at + 3..]))
+                .copied()
+                .collect(),
+        };
         Some(Rows { rows, stride, at, others: shrunk(others), on, numbers, exact })
     }
 

@@ -54,6 +54,31 @@ pub fn sample(name: &str, faces: usize, seed: u64) -> Mesh {
     mesh_of(&generate(name, &GenerateOptions::default().with_faces(faces).with_seed(seed)).unwrap())
 }
 
+/// A grid of heights whose normals differ from one side to the other of a seam that begins and ends inside.
+pub fn with_a_slit(seed: u64) -> Mesh {
+    const N: u32 = 12;
+    let height = |x: u32, y: u32| ((x * 7 + y * 13 + seed as u32 * 5) % 11) as f32 * 0.05;
+    let at = |x: u32, y: u32| y * (N + 1) + x;
+    let places = (0..=N).flat_map(|y| (0..=N).map(move |x| [x as f32, y as f32, height(x, y)]));
+    let mut input = MeshInput::triangles(places.collect::<Vec<[f32; 3]>>(), &[]);
+    let mut w = Wedges::new(vec![Channel::new(Semantic::Normal, 3)]).unwrap();
+    for k in 0..2 * (N + 1) * (N + 1) {
+        w.push(&[k as f32 * 0.01, (k % 7) as f32, 1.0], 1);
+    }
+    for (x, y) in (0..N).flat_map(|y| (0..N).map(move |x| (x, y))) {
+        for face in [[(x, y), (x + 1, y), (x + 1, y + 1)], [(x, y), (x + 1, y + 1), (x, y + 1)]] {
+            for (i, j) in face {
+                input.corners.push(at(i, j));
+                // Above the line the vertices inside of the slit have wedges of their own.
+                let other = y == 6 && j == 6 && (3..9).contains(&i);
+                w.corner.push(at(i, j) + if other { (N + 1) * (N + 1) } else { 0 });
+            }
+        }
+    }
+    input.wedges = Some(w);
+    Mesh::build(input, &BuildOptions::default()).unwrap().0
+}
+
 pub fn options(method: Method, placement: Option<Placement>) -> Options {
     let mut o = Options::default();
     (o.method, o.placement) = (method, placement);
