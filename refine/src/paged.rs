@@ -23,6 +23,7 @@ mod front;
 mod list;
 mod output;
 mod page;
+mod pool;
 mod ready;
 mod shelf;
 mod timed;
@@ -32,12 +33,13 @@ pub use shelf::Traffic;
 
 use crate::aif::NONE;
 use crate::format::{ByteRanges, FormatError, RangeReader};
-use crate::hierarchy::Rule;
+use crate::hierarchy::{Packed, Rule};
 use crate::progressive::{Damage, Fans};
 use crate::selective::{Clocks, Cull, Entry, Followed, Lens, LensError, Motions};
 use crate::view::Camera;
 use glam::{DMat4, DVec3, Vec3};
-use list::{List, Open};
+use list::{List, grown};
+use pool::Hot;
 use shelf::Shelf;
 use std::sync::Arc;
 use timed::{CHANGE, MOTION};
@@ -74,12 +76,11 @@ pub enum PagedError {
 pub struct PagedView<S> {
     shelf: Shelf<S>,
     fans: Fans,
-    /// The face in every slot; [`NONE`] for none.
-    face_in: Vec<u32>,
-    free: Vec<u32>,
     /// Slots whose corners changed, a bit each.
     touched: Vec<u64>,
     touched_wedges: usize,
+    /// The first slot of the split that is being applied.
+    slots: u32,
     /// Vertices, faces and splits of what is drawn.
     vertices: usize,
     faces: usize,
@@ -99,15 +100,17 @@ pub struct PagedView<S> {
     jumped: Followed,
     /// Bytes that the caller takes for every vertex shown.
     beside: usize,
-    /// Splits that could be applied next: what replaces nodes in the mesh. Their pages may not be there.
+    /// Splits that could be applied next: what replaces nodes in the mesh, those of the base first. Their pages may not be there.
     open: List,
-    /// Splits that could be undone next.
+    /// Splits that could be undone next, by their records.
     last: List,
     /// Needed splits, the most urgent on top; empty between frames.
     queue: std::collections::BinaryHeap<(u16, std::cmp::Reverse<u32>)>,
     closure: Vec<u32>,
-    /// Splits that were applied and whose nodes have not been looked at.
+    /// Records of splits that were applied and whose nodes have not been looked at.
     made: Vec<u32>,
+    /// Records of what a split depends on.
+    needed: Vec<u32>,
     resume: [usize; 2],
     clock: Clocks,
     /// The last frame did not look at all that was due.
@@ -127,10 +130,9 @@ impl<S: ByteRanges> PagedView<S> {
         let clock = Clocks::new(shelf.base.links.diagonal);
         let mut view = PagedView {
             shelf,
-            face_in: (0..faces as u32).collect(),
-            free: Vec::new(),
             touched: vec![0; faces.div_ceil(64)],
             touched_wedges: 0,
+            slots: 0,
             fans,
             vertices,
             faces,
@@ -148,20 +150,22 @@ impl<S: ByteRanges> PagedView<S> {
             queue: Default::default(),
             closure: Vec::new(),
             made: Vec::new(),
+            needed: Vec::new(),
             resume: [0; 2],
             clock,
             cut: false,
             begun: false,
             limit,
         };
-        view.open.reserve_to(vertices);
+        view.open.reserve_to([vertices; 2]);
+        view.open.extend_to(vertices);
         let needed = view.bytes() + view.shelf.most_at_once();
         if needed > limit {
             return Err(PagedError::Memory { limit, needed });
         }
         for v in 0..vertices as u32 {
             let centre = view.shelf.local_centre(v)?;
-            view.offer(v, centre);
+            view.offer(v, view.shelf.continuation(v), centre);
         }
         Ok(view)
     }
@@ -257,13 +261,12 @@ impl<S: ByteRanges> PagedView<S> {
     /// Bytes held: the sum of the capacities of all arrays, but for copies of the last frame's lenses. While a chunk is decoded, a part of the limit that is set aside for that is used as well.
     pub fn bytes(&self) -> usize {
         self.shelf.bytes()
-            + 28 * self.fans.corners.capacity()
-            + 4 * self.free.capacity()
+            + 24 * self.fans.corners.capacity()
             + 8 * self.touched.capacity()
             + self.open.bytes()
             + self.last.bytes()
             + 8 * self.queue.capacity()
-            + 4 * (self.closure.capacity() + self.made.capacity())
+            + 4 * (self.closure.capacity() + self.made.capacity() + self.needed.capacity())
             + MOTION * self.motions.as_ref().map_or(0, Motions::len)
             + CHANGE * self.ahead
             + self.beside * self.vertices
@@ -272,8 +275,8 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// Bytes that grow with the mesh shown, of [`PagedView::bytes`].
     pub fn shown_bytes(&self) -> usize {
-        28 * self.fans.corners.capacity()
-            + 4 * self.free.capacity()
+        24 * self.fans.corners.capacity()
+            + size_of::<Hot>() * self.shelf.pool.of.capacity()
             + 8 * self.touched.capacity()
             + self.open.bytes()
             + self.last.bytes()
@@ -317,22 +320,34 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// Room for `splits` more to be applied, in all arrays that grow with the mesh.
     fn reserve(&mut self, splits: usize) -> bool {
-        // An eighth more each time, so that growing costs little in sum; the old array is still there while the new one is filled.
-        let ask = |len: usize, cap: usize, more: usize| {
-            if len + more <= cap { 0 } else { (len + more).max(cap + cap / 8) + 64 }
-        };
-        let slots = self.fans.corners.len() - self.free.len() + 2 * (self.pending + splits);
-        let corners = ask(slots.max(self.fans.corners.len()), self.fans.corners.capacity(), 0);
-        let free = ask(slots.max(self.fans.corners.len()), self.free.capacity(), 0);
-        let open = ask(self.shelf.base.vertices() + self.led + splits, self.open.capacity(), 0);
-        let last = ask(self.led + splits, self.last.capacity(), 0);
-        let bytes = 28 * corners
-            + 4 * free
-            + corners / 8
-            + List::ENTRY * (open + last)
-            + self.beside * (self.pending + splits);
+        // An eighth more each time, so that growing costs little in sum.
+        let ask = |len: usize, cap: usize| if len <= cap { 0 } else { len.max(cap + cap / 8) + 64 };
+        let pool = &self.shelf.pool;
+        let records = ask(pool.alive() + splits, pool.of.capacity().min(self.last.capacity()[0]));
+        let there = ask(self.led + splits, self.last.capacity()[1]);
+        let open_there = ask(self.shelf.base.vertices() + self.led + splits, self.open.capacity()[1]);
+        let beside = self.beside * (self.pending + splits);
+        let (n0, m0) = (self.shelf.base.vertices(), self.shelf.head.base_faces as usize);
+        let (places, slots) = ([n0 + 2 * records, records], m0 + 2 * records);
+        let mut bytes = beside;
+        if records + there + open_there > 0 {
+            // One array after the other.
+            let of_slots = [
+                grown::<Hot>(pool.of.capacity(), records),
+                grown::<[u32; 3]>(self.fans.corners.capacity(), slots),
+                grown::<[u32; 3]>(self.fans.links.capacity(), slots),
+                grown::<u64>(self.touched.capacity(), slots.div_ceil(64)),
+            ];
+            let lists = [self.open.growth([places[0], open_there]), self.last.growth([places[1], there])];
+            let all = of_slots.iter().filter(|_| records > 0).chain(&lists);
+            let [more, most] = all.fold([0; 2], |sum, g| [sum[0] + g[0], sum[1].max(g[1])]);
+            bytes += more + most;
+        }
         let moving = if self.motions.is_some() && !self.at_once { CHANGE * splits } else { 0 };
-        if bytes + moving > 0 && !self.make_room(bytes + moving) {
+        if bytes + moving == 0 {
+            return true;
+        }
+        if !self.make_room(bytes + moving) {
             // Better at once than not at all.
             if moving == 0 || !self.make_room(bytes) {
                 return false;
@@ -342,73 +357,32 @@ impl<S: ByteRanges> PagedView<S> {
         fn grow<T>(v: &mut Vec<T>, to: usize) {
             v.reserve_exact(to.saturating_sub(v.len()));
         }
-        if corners > 0 {
-            grow(&mut self.fans.corners, corners);
-            grow(&mut self.fans.links, corners);
-            grow(&mut self.face_in, corners);
-            grow(&mut self.touched, corners.div_ceil(64));
+        if records > 0 {
+            grow(&mut self.shelf.pool.of, records);
+            grow(&mut self.fans.corners, slots);
+            grow(&mut self.fans.links, slots);
+            grow(&mut self.touched, slots.div_ceil(64));
         }
-        grow(&mut self.free, free);
-        self.open.reserve_to(open);
-        self.last.reserve_to(last);
+        self.open.reserve_to([places[0], open_there]);
+        self.last.reserve_to([places[1], there]);
         true
     }
 
-    /// Node `k` is in the mesh now, and stands at `centre`, about the origin of the bounds: what replaces it can be applied.
-    fn offer(&mut self, k: u32, centre: Vec3) {
-        let (next, bounds) = self.shelf.continuation(k);
+    /// A node is in the mesh now, in this place of the list: what replaces it, if anything, can be applied.
+    fn offer(&mut self, place: u32, (next, bounds): (u32, Packed), centre: Vec3) {
         if next != NONE {
-            self.put_open(k, Entry::new(next, centre, bounds));
+            self.open.put(place, Entry::new(next, centre, bounds));
         }
     }
 
-    fn put_open(&mut self, node: u32, entry: Entry) {
-        let at = self.open.push(Open { entry, node });
-        self.shelf.set_open_place(node, at);
-    }
-
-    /// What replaces node `k`, which is in the mesh.
-    fn open_at(&self, k: u32) -> Option<Entry> {
-        self.open.get(self.shelf.open_place(k)).filter(|o| o.node == k).map(|o| o.entry)
-    }
-
-    /// Node `k` is not in the mesh any more, or was replaced.
-    fn withdraw(&mut self, k: u32) {
-        let at = self.shelf.open_place(k);
-        if self.open.get(at).is_some_and(|o| o.node == k) {
-            self.shelf.set_open_place(k, NONE);
-            self.open.take_out(at);
-        }
-    }
-
-    /// Split `i`, which is applied, can be undone.
-    fn free_split(&mut self, i: u32) -> Result<(), PagedError> {
-        let Some(r) = self.shelf.record(i).filter(|r| r.last_place == NONE) else { return Ok(()) };
-        let (node, vertex, bounds) = (r.parent, r.vertex, r.bounds);
-        // Where nothing moves, its vertex stands where it always does.
-        let centre = match self.shelf.moves {
-            true => self.shelf.local_centre(node)?,
-            false => self.shelf.local_place(vertex)?,
-        };
-        self.put_last(node, Entry::new(i, centre, bounds));
-        Ok(())
-    }
-
-    fn put_last(&mut self, node: u32, entry: Entry) {
-        let at = self.last.push(Open { entry, node });
-        self.shelf.set_last_place(entry.split, at);
-    }
-
-    /// Split `i`, if it can be undone.
-    fn last_at(&self, i: u32) -> Option<Entry> {
-        self.last.get(self.shelf.last_place(i)).map(|o| o.entry).filter(|e| e.split == i)
-    }
-
-    fn hold_split(&mut self, i: u32) {
-        let at = self.shelf.last_place(i);
-        if self.last.get(at).is_some_and(|o| o.entry.split == i) {
-            self.shelf.set_last_place(i, NONE);
-            self.last.take_out(at);
-        }
+    /// What could come next or be undone of all records has places, and their faces have slots.
+    fn extend(&mut self) {
+        let records = self.shelf.pool.of.len();
+        let slots = self.shelf.head.base_faces as usize + 2 * records;
+        self.fans.corners.resize(slots, [0; 3]);
+        self.fans.links.resize(slots, [NONE; 3]);
+        self.touched.resize(slots.div_ceil(64), 0);
+        self.open.extend_to(self.shelf.base.vertices() + 2 * records);
+        self.last.extend_to(records);
     }
 }

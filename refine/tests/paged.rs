@@ -236,7 +236,7 @@ fn chunks_that_take_much_on_the_way_are_read() {
 #[test]
 fn a_limit_is_kept_and_changes_no_mesh() {
     let bytes = file_by(Rule::Rings, 160, "scan", 24_000, None);
-    let roomy = fly(&bytes, PLENTY, 6);
+    let roomy = fly(&bytes, PLENTY, 12);
     let all = roomy.traffic();
     assert!(all.bytes_touched <= all.bytes_read && all.bytes_touched <= bytes.len() as u64);
     assert!(all.chunks_touched == all.chunks_decoded && all.evictions == 0, "{all:?}");
@@ -249,7 +249,7 @@ fn a_limit_is_kept_and_changes_no_mesh() {
         };
         let (centre, diagonal) = view.extent();
         let mut all = true;
-        for k in 0..6 {
+        for k in 0..12 {
             let c = camera(centre, diagonal, 0.7 * k as f64, 0.6 + 0.5 * (k % 3) as f64);
             let lens = view.lens(&c, &DMat4::IDENTITY, TAU[k % 3], Cull::All).unwrap();
             let done = view.adapt(&[lens], &PagedLimits::default()).unwrap();
@@ -273,7 +273,7 @@ fn a_limit_is_kept_and_changes_no_mesh() {
         }
     }
     assert!(short > 0, "some limits are too small for the view, but not for the base");
-    let tight = fly(&bytes, high, 6);
+    let tight = fly(&bytes, high, 12);
     assert!(tight.traffic().evictions > 0, "{:?}", tight.traffic());
     assert_eq!(tight.traffic().bytes_touched, all.bytes_touched);
 }

@@ -1,8 +1,8 @@
 //! From the mesh of the last frame to that of this one, fetching what it needs.
 
-use super::page::LED;
+use super::pool::{APPLIED, LED};
 use super::ready::LOT;
-use super::shelf::Fetch;
+use super::shelf::{AtHand, Fetch};
 use super::timed::CHANGE;
 use super::{PagedError, PagedView};
 use crate::aif::NONE;
@@ -205,24 +205,24 @@ impl<S: ByteRanges> PagedView<S> {
         Ok(())
     }
 
-    /// Undoes splits that could be and are not needed; appends what could be then.
+    /// Undoes splits, by their records, that could be and are not needed; appends what could be then.
     fn undo_lot(
         &mut self,
         lot: &[u32],
         freed: &mut Vec<u32>,
         frame: &mut Frame<'_>,
     ) -> Result<(), PagedError> {
-        for (k, &i) in lot.iter().enumerate() {
+        for (k, &h) in lot.iter().enumerate() {
             if k % LOT == 0 {
                 self.ready_to_undo(&lot[k..lot.len().min(k + LOT)]);
             }
             if !frame.meter.goes_on() {
                 return Ok(());
             }
-            if self.shelf.last_place(i) == NONE {
+            if !self.last.has(h) {
                 continue;
             }
-            self.undo(i, freed)?;
+            self.undo(h, freed)?;
             frame.meter.done.collapses += 1;
             frame.meter.since += 1;
         }
@@ -239,11 +239,9 @@ impl<S: ByteRanges> PagedView<S> {
     ) -> Result<(), PagedError> {
         let part = freed.len() - freed.len().min(LOT);
         desk.clear();
-        for &i in &freed[part..] {
-            let place = self.shelf.last_place(i);
-            // It may have come in twice.
-            if let Some(o) = self.last.get(place).filter(|o| o.entry.split == i) {
-                desk.put(place, &o.entry);
+        for &h in &freed[part..] {
+            if let Some(e) = self.last.get(h) {
+                desk.put(h, e);
             }
         }
         freed.truncate(part);
@@ -256,8 +254,8 @@ impl<S: ByteRanges> PagedView<S> {
     /// Looks at those on the desk, which could be undone: what is not needed is appended to `lot`, of the others is noted when they are due.
     fn sift(&mut self, desk: &mut Desk<'_>, lot: &mut Vec<u32>) {
         self.clock.look(&desk.last, &desk.entries, &mut desk.looked);
-        for ((&place, e), (wanted, due)) in desk.places.iter().zip(&desk.entries).zip(desk.looked.each()) {
-            if wanted { self.last.set_due(place, due) } else { lot.push(e.split) }
+        for (&place, (wanted, due)) in desk.places.iter().zip(desk.looked.each()) {
+            if wanted { self.last.set_due(place, due) } else { lot.push(place) }
         }
     }
 
@@ -313,8 +311,8 @@ impl<S: ByteRanges> PagedView<S> {
                 let next = self.queue.iter().take(IN_SIGHT).map(|q| q.1.0);
                 lot.iter().copied().chain(next).for_each(|i| _ = self.shelf.wish(i));
             }
-            self.ready_to_apply(&lot);
-            for (k, &i) in lot.iter().enumerate() {
+            let at_hand = self.ready_to_apply(&lot);
+            for (k, (&i, at)) in lot.iter().zip(&at_hand).enumerate() {
                 if self.shelf.is_led(i) {
                     continue;
                 }
@@ -326,7 +324,13 @@ impl<S: ByteRanges> PagedView<S> {
                     frame.meter.done.refused += lot.len() - k + self.queue.len();
                     return Ok(());
                 }
-                self.apply_with_all(i, frame)?;
+                let alone = match at {
+                    Some(at) => self.apply_alone(i, at, frame)?,
+                    None => false,
+                };
+                if !alone {
+                    self.apply_with_all(i, frame)?;
+                }
                 if self.made.len() >= LOT {
                     self.look_at_made(desk, frame);
                 }
@@ -363,20 +367,19 @@ impl<S: ByteRanges> PagedView<S> {
         let made = std::mem::take(&mut self.made);
         for part in made.chunks(LOT / 2) {
             desk.clear();
-            for &i in part {
-                let old = self.shelf.head.base_vertices + 2 * i;
-                for (k, place) in (old..).zip(self.shelf.record(i).map_or([NONE; 2], |r| r.open_place)) {
-                    if let Some(o) = self.open.get(place).filter(|o| o.node == k) {
-                        desk.put(place, &o.entry);
+            for &h in part {
+                let first = self.shelf.first_open(h);
+                for place in [first, first + 1] {
+                    if let Some(e) = self.open.get(place) {
+                        desk.put(place, e);
                     }
                 }
             }
             self.look_at_open(desk, frame);
             desk.clear();
-            for &i in part {
-                let place = self.shelf.last_place(i);
-                if let Some(o) = self.last.get(place).filter(|o| o.entry.split == i) {
-                    desk.put(place, &o.entry);
+            for &h in part {
+                if let Some(e) = self.last.get(h) {
+                    desk.put(h, e);
                 }
             }
             self.clock.look(&desk.last, &desk.entries, &mut desk.looked);
@@ -434,7 +437,6 @@ impl<S: ByteRanges> PagedView<S> {
                 return Ok(());
             }
             self.apply(j)?;
-            self.made.push(j);
             let done = &mut frame.meter.done;
             done.splits += 1;
             done.forced += usize::from(j != i);
@@ -511,56 +513,90 @@ impl<S: ByteRanges> PagedView<S> {
         Ok(Gathered::Whole)
     }
 
-    fn is_free(&self, i: u32) -> bool {
-        self.shelf.record(i).is_some_and(|r| r.flags & LED != 0 && r.dependents == 0)
-    }
-
     /// Asks for split `i`, whose page is there, whose dependencies are asked for, and for which there is room; with geomorphs by time it is applied later.
     fn apply(&mut self, i: u32) -> Result<(), PagedError> {
-        let needs = self.can_count(i, |r| r.dependents)?;
-        let (node, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
-        // It says itself what it replaces, and what it replaces says by what.
-        let entry = self.open_at(node).filter(|e| e.split == i).ok_or(Damage::Fan(i as usize))?;
-        if self.motions.is_none() {
-            self.split_faces(i)?;
+        let lost = Damage::Fan(i as usize);
+        let at = self.shelf.at_hand(i).ok_or(lost)?;
+        if at.whole {
+            return self.apply_at(i, &at, &at.needs);
         }
-        self.lead(i, needs, true);
-        self.withdraw(node);
-        for d in needs.into_iter().filter(|&d| d != NONE) {
-            self.hold_split(d);
-        }
-        for k in 0..self.shelf.further(i).len() {
-            self.hold_split(self.shelf.further(i)[k]);
-        }
-        self.put_last(node, entry);
-        let old = self.shelf.head.base_vertices + 2 * i;
-        let centre = if self.shelf.moves { self.shelf.local_centre(old)? } else { entry.centre() };
-        self.offer(old, centre);
-        let centre = self.shelf.local_centre(old + 1)?;
-        self.offer(old + 1, centre);
+        let mut needs = std::mem::take(&mut self.needed);
+        self.shelf.needs_into(i, &mut needs)?;
+        self.apply_at(i, &at, &needs)?;
+        self.needed = needs;
         Ok(())
     }
 
-    /// No longer asks for split `i`, on which nothing that is depends; appends to `freed` what can be undone then.
-    fn undo(&mut self, i: u32, freed: &mut Vec<u32>) -> Result<(), PagedError> {
-        let needs = self.shelf.needs(i).ok_or(Damage::Fan(i as usize))?;
-        let (node, _) = self.shelf.parent(i).ok_or(Damage::Fan(i as usize))?;
-        let entry = self.last_at(i).ok_or(Damage::Fan(i as usize))?;
+    /// The same of a split that is at hand, the records of what it depends on being known.
+    fn apply_at(&mut self, i: u32, at: &AtHand, needs: &[u32]) -> Result<(), PagedError> {
+        let lost = || Damage::Fan(i as usize);
+        let page = self.shelf.use_page(at).ok_or_else(lost)?;
+        let (r, new) = (*page.of.get(at.k as usize).ok_or_else(lost)?, page.place(at.k as usize));
+        self.can_count(i, needs, LED, |r| r.dependents)?;
+        // It says itself what it replaces, and what it replaces says by what.
+        let place = self.shelf.open_place_of(needs[0], r.parent);
+        let entry = *self.open.get(place).filter(|e| e.split == i).ok_or_else(lost)?;
+        let (h, more) = self.shelf.come(i, at, needs).ok_or_else(lost)?;
+        if more {
+            self.extend();
+        }
+        if self.motions.is_none()
+            && let Err(e) = self.split_faces(h)
+        {
+            self.shelf.go(h);
+            return Err(e);
+        }
+        self.lead(h, needs, true, |_| ());
+        self.open.take_out(place);
+        self.last.put(h, entry);
         let old = self.shelf.head.base_vertices + 2 * i;
-        self.withdraw(old);
-        self.withdraw(old + 1);
-        self.hold_split(i);
+        let centre = if self.shelf.moves { self.shelf.local_centre(old)? } else { entry.centre() };
+        let first = self.shelf.first_open(h);
+        self.offer(first, (r.next[0], r.bounds[0]), centre);
+        let new = (new - self.shelf.base.links.origin).as_vec3();
+        self.offer(first + 1, (r.next[1], r.bounds[1]), new);
+        self.made.push(h);
+        Ok(())
+    }
+
+    /// Applies a split that is needed, whose dependencies are asked for, unless limits are in the way; false if that, or where it is, is to be found out otherwise.
+    fn apply_alone(&mut self, i: u32, at: &AtHand, frame: &mut Frame<'_>) -> Result<bool, PagedError> {
+        self.shelf.clock += 1;
+        let led = |h: &u32| *h == NONE || self.shelf.pool.get(*h).is_some_and(|r| r.flags & LED != 0);
+        if !at.whole || !at.needs.iter().all(led) {
+            return Ok(false);
+        }
+        let Some(page) = self.shelf.use_page(at) else { return Ok(false) };
+        let more = 1 + page.of.get(at.k as usize).is_some_and(|r| r.code.two_faces()) as usize;
+        if self.led_faces + more > frame.meter.limits.faces || !self.reserve(1) {
+            return Ok(false);
+        }
+        self.apply_at(i, at, &at.needs)?;
+        frame.meter.done.splits += 1;
+        frame.meter.since += 1;
+        Ok(true)
+    }
+
+    /// No longer asks for the split of a record, on which nothing that is depends; appends to `freed` what can be undone then.
+    fn undo(&mut self, h: u32, freed: &mut Vec<u32>) -> Result<(), PagedError> {
+        let hot = *self.shelf.pool.get(h).ok_or(Damage::Fan(h as usize))?;
+        let mut needs = std::mem::take(&mut self.needed);
+        self.shelf.needs_of_hot(h, &mut needs)?;
+        let place = self.shelf.open_place_of(hot.needs[0], hot.parent);
+        let first = self.shelf.first_open(h);
+        self.open.take_out(first);
+        self.open.take_out(first + 1);
+        self.last.take_out(h);
         if self.motions.is_none() {
-            self.unsplit_faces(i)?;
+            self.unsplit_faces(h)?;
         } else if !self.at_once && !self.make_room(CHANGE) {
             self.jump();
         }
-        self.lead(i, needs, false);
-        self.put_open(node, entry);
-        let from = freed.len();
-        freed.extend(needs.iter().chain(self.shelf.further(i)).filter(|&&d| d != NONE && self.is_free(d)));
-        for &d in &freed[from..] {
-            self.free_split(d)?;
+        self.lead(h, &needs, false, |d| freed.push(d));
+        self.needed = needs;
+        self.open.put_back(place);
+        if self.shelf.pool.get(h).is_none_or(|r| r.flags & (APPLIED | LED) == 0) {
+            self.shelf.go(h);
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! A split and its undoing on the faces shown, with what stands in pages.
 
-use super::page::{APPLIED, LED, Record, RowRef};
-use super::shelf::Shelf;
+use super::page::RowRef;
+use super::pool::{APPLIED, Hot, LED};
 use super::{PagedError, PagedView};
 use crate::aif::NONE;
 use crate::format::ByteRanges;
@@ -9,19 +9,19 @@ use crate::progressive::{Damage, Explicit, Fans, Half, SplitKind};
 use crate::selective::{Known, Sheet, split, unsplit};
 
 impl<S: ByteRanges> PagedView<S> {
-    /// What is to be known of split `i`, and its entry of the explicit stream.
-    fn known(&self, i: u32) -> Result<(Known, Explicit), Damage> {
+    /// What is to be known of the split of a record, and its entry of the explicit stream.
+    fn known(&self, r: &Hot) -> Result<(Known, Explicit), Damage> {
+        let (i, new_vertex) = (r.split, self.shelf.head.base_vertices + r.split);
+        let mut known =
+            Known { split: i, vertex: r.vertex, new_vertex, code: r.code, wedge: new_vertex, row: 0 };
+        if self.shelf.head.channels.is_none() && r.code.kind() != SplitKind::Explicit {
+            return Ok((known, Explicit::default()));
+        }
         let Some((p, k)) = self.shelf.page(i) else { return Err(Damage::Fan(i as usize)) };
-        let new_vertex = self.shelf.head.base_vertices + i;
         let rows = p.split_rows.get(k);
-        let known = Known {
-            split: i,
-            vertex: p.of[k].vertex,
-            new_vertex,
-            code: p.of[k].code,
-            wedge: rows.map_or(new_vertex, |r| r.wedge),
-            row: rows.map_or(0, |r| r.row),
-        };
+        if let Some(r) = rows {
+            (known.wedge, known.row) = (r.wedge, r.row);
+        }
         let explicit = match known.code.kind() {
             SplitKind::Explicit => {
                 let at = rows.map_or(0, |r| r.explicit as usize);
@@ -33,91 +33,110 @@ impl<S: ByteRanges> PagedView<S> {
         Ok((known, explicit))
     }
 
-    /// The slot of a face that a cut of a record names, as `slot * 4 + edge`.
-    fn cut(&self, i: u32, cut: u32) -> Result<u32, Damage> {
-        match self.shelf.slot_of_cut(cut) {
-            NONE => Err(Damage::Reference { what: "split", at: i as usize, to: cut }),
-            slot => Ok(slot << 2 | cut & 3),
-        }
+    /// The slot of a face that a cut names, as `slot * 4 + edge`, the record of the split that makes it being known ([`NONE`] of the base).
+    fn cut(&self, i: u32, cut: u32, maker: u32) -> Result<u32, Damage> {
+        let lost = Err(Damage::Reference { what: "split", at: i as usize, to: cut });
+        let (split, side) = self.shelf.half_of_cut(cut);
+        let slot = match self.shelf.pool.get(maker) {
+            None if split == NONE && cut >> 2 < self.shelf.head.base_faces => cut >> 2,
+            Some(r) if r.split == split && r.flags & APPLIED != 0 && (side == 0 || r.code.two_faces()) => {
+                self.shelf.first_slot(maker) + side as u32
+            }
+            _ => return lost,
+        };
+        Ok(slot << 2 | cut & 3)
     }
 
-    /// Applies split `i`, whose page is there and whose dependencies are applied. O(valence).
+    /// Applies the split of a record, whose dependencies are applied. O(valence).
     ///
     /// Errors: damage; nothing has changed then.
-    pub(super) fn split_faces(&mut self, i: u32) -> Result<(), PagedError> {
-        let at = i as usize;
-        let (s, explicit) = self.known(i)?;
+    pub(super) fn split_faces(&mut self, h: u32) -> Result<(), PagedError> {
+        let hot = *self.shelf.pool.get(h).ok_or(Damage::Fan(h as usize))?;
+        let (i, at) = (hot.split, hot.split as usize);
+        let (s, explicit) = self.known(&hot)?;
         let Some(r) = self.shelf.record(i) else { return Err(Damage::Fan(at).into()) };
-        let (left, right, parent) = (r.left, r.right, r.parent);
+        let (left, right) = (r.left, r.right);
         // The vertex is at the node that the split replaces.
-        if self.shelf.node(s.vertex) != parent {
+        if self.shelf.node_of(s.vertex, hot.maker) != hot.parent {
             return Err(Damage::Fan(at).into());
         }
-        let mut needs = [NONE; 3];
+        let right = if s.code.two_faces() { self.cut(i, right, hot.needs[2])? } else { NONE };
+        let cuts = (self.cut(i, left, hot.needs[1])?, right);
+        self.slots = self.shelf.first_slot(h);
         if self.motions.is_some() {
-            needs = self.can_count(i, |r| r.holders)?;
+            let mut needs = std::mem::take(&mut self.needed);
+            self.shelf.needs_of_hot(h, &mut needs)?;
+            self.can_count(i, &needs, APPLIED | LED, |r| r.holders)?;
+            split(self, &s, cuts, &explicit)?;
+            for &d in &needs {
+                self.shelf.pool.get_mut(d).into_iter().for_each(|d| d.holders += 1);
+            }
+            self.needed = needs;
+            self.pending -= usize::from(hot.flags & LED != 0);
+        } else {
+            split(self, &s, cuts, &explicit)?;
         }
-        let right = if s.code.two_faces() { self.cut(i, right)? } else { NONE };
-        let cuts = (self.cut(i, left)?, right);
-        split(self, &s, cuts, &explicit)?;
         let old = self.shelf.head.base_vertices + 2 * i;
-        self.shelf.set_node(s.vertex, old);
-        self.shelf.set_node(s.new_vertex, old + 1);
-        self.vertices += 1;
-        self.applied += 1;
+        self.shelf.set_node_of(s.vertex, hot.maker, old);
+        if let Some(r) = self.shelf.pool.get_mut(h) {
+            r.node = old + 1;
+            r.flags |= APPLIED;
+        }
         if let Some((p, k)) = self.shelf.page_mut(i) {
-            p.set(k, APPLIED, true);
+            p.set_there(k, true);
         }
-        if self.motions.is_some() {
-            self.pending -= usize::from(self.shelf.is_led(i));
-            self.count(i, needs, |r| &mut r.holders, 1);
-        }
+        self.vertices += 1;
+        self.faces += 1 + s.code.two_faces() as usize;
+        self.applied += 1;
         Ok(())
     }
 
-    /// What split `i` depends on can have one more that depends on it. Honest meshes have few: what a hostile file says of more is damage.
-    pub(super) fn can_count(&self, i: u32, of: impl Fn(&Record) -> u16) -> Result<[u32; 3], Damage> {
-        let needs = self.shelf.needs(i).ok_or(Damage::Fan(i as usize))?;
-        let further = self.shelf.further(i);
+    /// What split `i` depends on, by these records, has these flags and can have one more that depends on it. Honest meshes have few: what a hostile file says of more is damage.
+    pub(super) fn can_count(
+        &self,
+        i: u32,
+        needs: &[u32],
+        flags: u8,
+        of: impl Fn(&Hot) -> u16,
+    ) -> Result<(), Damage> {
         // It may be listed so often.
-        let times = needs.len() + further.len();
-        let full = |d: u32| self.shelf.record(d).is_none_or(|r| of(r) as usize + times > u16::MAX.into());
-        match needs.iter().any(|&d| d != NONE && full(d)) || further.iter().any(|&d| full(d)) {
-            true => Err(Damage::Fan(i as usize)),
-            false => Ok(needs),
+        let times = needs.len();
+        let can = |r: &Hot| r.flags & flags != 0 && of(r) as usize + times <= u16::MAX.into();
+        match needs.iter().all(|&d| d == NONE || self.shelf.pool.get(d).is_some_and(can)) {
+            true => Ok(()),
+            false => Err(Damage::Fan(i as usize)),
         }
     }
 
-    /// Adds `by` to what is counted of what split `i` depends on: `needs` of its vertex and cuts.
-    fn count(&mut self, i: u32, needs: [u32; 3], of: impl Fn(&mut Record) -> &mut u16, by: i16) {
-        let add = |shelf: &mut Shelf<S>, d: u32| {
-            if let Some(r) = shelf.record_mut(d) {
-                let n = of(r);
-                *n = n.wrapping_add_signed(by);
-            }
-        };
-        needs.into_iter().filter(|&d| d != NONE).for_each(|d| add(&mut self.shelf, d));
-        for k in 0..self.shelf.further(i).len() {
-            let d = self.shelf.further(i)[k];
-            add(&mut self.shelf, d);
+    /// The split of a record, which depends on `needs`, is asked for now, or no longer. What it depends on can have one more that does; what could be undone when it no longer is, is told.
+    pub(super) fn lead(&mut self, h: u32, needs: &[u32], on: bool, mut freed: impl FnMut(u32)) {
+        let timed = self.motions.is_some();
+        let (mut drawn, mut faces) = (true, 0);
+        let mut split = NONE;
+        if let Some(r) = self.shelf.pool.get_mut(h) {
+            r.flags = if on { r.flags | LED } else { r.flags & !LED };
+            drawn = r.flags & APPLIED != 0;
+            faces = 1 + r.code.two_faces() as usize;
+            split = r.split;
         }
-    }
-
-    /// Split `i`, which depends on `needs` by its vertex and cuts, is asked for now, or no longer. What it depends on can have one more that does.
-    pub(super) fn lead(&mut self, i: u32, needs: [u32; 3], on: bool) {
-        let (clock, timed) = (self.shelf.clock, self.motions.is_some());
-        let mut drawn = true;
-        let mut faces = 0;
-        if let Some((p, k)) = self.shelf.page_mut(i) {
-            p.set(k, LED, on);
-            p.turned |= timed;
-            drawn = p.of[k].flags & APPLIED != 0;
-            faces = 1 + p.of[k].code.two_faces() as usize;
-            if !on {
-                p.stamp = clock;
+        if timed && let Some((p, _)) = self.shelf.page_mut(split) {
+            p.turned = true;
+        }
+        for &d in needs.iter().filter(|&&d| d != NONE) {
+            let Some(r) = self.shelf.pool.get_mut(d) else { continue };
+            if on {
+                if r.dependents == 0 {
+                    self.last.take_out(d);
+                }
+                r.dependents += 1;
+            } else {
+                r.dependents -= 1;
+                if r.dependents == 0 && r.flags & LED != 0 {
+                    self.last.put_back(d);
+                    freed(d);
+                }
             }
         }
-        self.count(i, needs, |r| &mut r.dependents, if on { 1 } else { -1 });
         let pending = usize::from(timed && !drawn);
         if on {
             self.led += 1;
@@ -131,50 +150,37 @@ impl<S: ByteRanges> PagedView<S> {
         self.ahead += usize::from(timed && !self.at_once);
     }
 
-    /// Undoes split `i`, which is applied and on which nothing applied depends. O(valence).
-    pub(super) fn unsplit_faces(&mut self, i: u32) -> Result<(), PagedError> {
-        let (s, explicit) = self.known(i)?;
-        let r = self.shelf.record(i).ok_or(Damage::Fan(i as usize))?;
-        let (parent, [fl, fr]) = (r.parent, r.slots);
-        let fr = if s.code.two_faces() { fr } else { fl };
-        if fl == NONE || fr == NONE {
-            return Err(Damage::Fan(i as usize).into());
-        }
-        unsplit(self, &s, [fl, fr], &explicit);
-        let clock = self.shelf.clock;
-        self.shelf.set_node(s.vertex, parent);
-        self.shelf.set_node(s.new_vertex, NONE);
-        self.vertices -= 1;
-        self.applied -= 1;
-        if let Some((p, k)) = self.shelf.page_mut(i) {
-            p.set(k, APPLIED, false);
-            p.stamp = clock;
+    /// Undoes the split of a record, which is applied and on which nothing applied depends. O(valence).
+    pub(super) fn unsplit_faces(&mut self, h: u32) -> Result<(), PagedError> {
+        let hot = *self.shelf.pool.get(h).ok_or(Damage::Fan(h as usize))?;
+        let (s, explicit) = self.known(&hot)?;
+        let first = self.shelf.first_slot(h);
+        if hot.flags & APPLIED == 0 {
+            return Err(Damage::Fan(hot.split as usize).into());
         }
         if self.motions.is_some() {
-            let needs = self.shelf.needs(i).unwrap_or([NONE; 3]);
-            self.count(i, needs, |r| &mut r.holders, -1);
+            let mut needs = std::mem::take(&mut self.needed);
+            self.shelf.needs_of_hot(h, &mut needs)?;
+            for &d in &needs {
+                self.shelf.pool.get_mut(d).into_iter().for_each(|d| d.holders -= 1);
+            }
+            self.needed = needs;
         }
+        unsplit(self, &s, [first, first + s.code.two_faces() as u32], &explicit);
+        self.shelf.set_node_of(s.vertex, hot.maker, hot.parent);
+        if let Some(r) = self.shelf.pool.get_mut(h) {
+            r.node = NONE;
+            r.flags &= !APPLIED;
+        }
+        let clock = self.shelf.clock;
+        if let Some((p, k)) = self.shelf.page_mut(hot.split) {
+            p.set_there(k, false);
+            p.stamp = clock;
+        }
+        self.vertices -= 1;
+        self.faces -= 1 + s.code.two_faces() as usize;
+        self.applied -= 1;
         Ok(())
-    }
-
-    /// A slot for face `f`. There is room for it.
-    fn take_slot(&mut self, f: u32) -> u32 {
-        let slot = self.free.pop().unwrap_or_else(|| {
-            self.fans.corners.push([NONE; 3]);
-            self.fans.links.push([NONE; 3]);
-            self.face_in.push(NONE);
-            self.touched.resize(self.fans.corners.len().div_ceil(64), 0);
-            (self.fans.corners.len() - 1) as u32
-        });
-        self.face_in[slot as usize] = f;
-        self.faces += 1;
-        slot
-    }
-
-    fn leave_slot(&mut self, slot: u32) {
-        self.face_in[slot as usize] = NONE;
-        self.free.push(slot);
-        self.faces -= 1;
     }
 }
 
@@ -223,25 +229,11 @@ impl<S: ByteRanges> Sheet for PagedView<S> {
         self.shelf.set_wedge_row(w, RowRef::NOTHING);
     }
 
-    fn take_slots(&mut self, of: &Known) -> [u32; 2] {
-        let face = self.shelf.head.first_face(of.split);
-        let left = self.take_slot(face);
-        let right = if of.code.two_faces() { self.take_slot(face + 1) } else { NONE };
-        if let Some(r) = self.shelf.record_mut(of.split) {
-            r.slots = [left, right];
-        }
-        [left, if right == NONE { left } else { right }]
+    fn take_slots(&mut self, _: &Known) -> [u32; 2] {
+        [self.slots, self.slots + 1]
     }
 
-    fn leave_slots(&mut self, of: &Known, [left, right]: [u32; 2]) {
-        self.leave_slot(left);
-        if of.code.two_faces() {
-            self.leave_slot(right);
-        }
-        if let Some(r) = self.shelf.record_mut(of.split) {
-            r.slots = [NONE; 2];
-        }
-    }
+    fn leave_slots(&mut self, _: &Known, _: [u32; 2]) {}
 
     fn touch(&mut self, slot: u32) {
         self.touched[slot as usize / 64] |= 1 << (slot % 64);

@@ -1,113 +1,123 @@
 //! Splits that could be made or undone next, and when to look at them: the times apart, as most frames look at few of many.
 //!
-//! Entries keep their places, and places are used again: so what is taken out moves no other, whose page would have to be told. Few frames ask all times. From time to time all are, for those that
+//! Entries have places that are told by what they are of, and stay there while they are not to be asked: so nothing is moved, or looked for. Few frames ask all times. From time to time all are, for those that
 //! may come before a *horizon*, some frames like the last from now; until lenses have passed that, frames ask these alone.
 
-use crate::aif::NONE;
 use crate::selective::{Clocks, Due, Entry, Sums};
-
-/// A split that may come next, or may be undone next.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Open {
-    pub(super) entry: Entry,
-    /// The node it replaces; [`NONE`] of a free place, whose split is the next one that is free.
-    pub(super) node: u32,
-}
 
 /// Frames to the horizon, at most.
 const FRAMES: f64 = 16.0;
 
-/// A list without order.
-#[derive(Debug)]
+/// More bytes that an array of such a capacity takes with room for so many, and those of the old one while it is filled.
+pub(super) fn grown<T>(capacity: usize, to: usize) -> [usize; 2] {
+    match to.checked_sub(capacity) {
+        None | Some(0) => [0; 2],
+        Some(more) => [more * size_of::<T>(), capacity * size_of::<T>()],
+    }
+}
+
+/// A list without order, by places.
+#[derive(Debug, Default)]
 pub(super) struct List {
-    of: Vec<Open>,
-    /// Free places are never due.
+    of: Vec<Entry>,
+    /// What is not there is never due.
     due: Vec<Due>,
-    /// The first free place.
-    free: u32,
     /// Places that are due before the horizon, and when. What has been told otherwise since is still there, and left out when it comes.
     soon: Vec<(u32, Due)>,
     horizon: Option<Sums>,
-    /// Places that are due in this frame; some may have been taken out since.
+    /// Places that are due in this frame, ascending; some may have been taken out since.
     ready: Vec<u32>,
-}
-
-impl Default for List {
-    fn default() -> Self {
-        List {
-            of: Vec::new(),
-            due: Vec::new(),
-            free: NONE,
-            soon: Vec::new(),
-            horizon: None,
-            ready: Vec::new(),
-        }
-    }
+    /// A bit for every place, all 0: to sort with.
+    sorting: Vec<u64>,
 }
 
 impl List {
-    /// Bytes of an entry.
-    pub(super) const ENTRY: usize =
-        size_of::<Open>() + size_of::<Due>() + size_of::<(u32, Due)>() + size_of::<u32>();
-
-    /// Of all arrays the least.
-    pub(super) fn capacity(&self) -> usize {
-        let lists = self.soon.capacity().min(self.ready.capacity());
-        self.of.capacity().min(self.due.capacity()).min(lists)
+    /// Places, and entries that can be there at once.
+    pub(super) fn capacity(&self) -> [usize; 2] {
+        [self.of.capacity().min(self.due.capacity()), self.soon.capacity().min(self.ready.capacity())]
     }
 
     pub(super) fn bytes(&self) -> usize {
-        size_of::<Open>() * self.of.capacity()
+        size_of::<Entry>() * self.of.capacity()
             + size_of::<Due>() * self.due.capacity()
             + size_of::<(u32, Due)>() * self.soon.capacity()
             + size_of::<u32>() * self.ready.capacity()
+            + size_of::<u64>() * self.sorting.capacity()
     }
 
-    /// Room for so many in all.
-    pub(super) fn reserve_to(&mut self, to: usize) {
+    /// Room for so many places, and for so many that are there.
+    pub(super) fn reserve_to(&mut self, [places, there]: [usize; 2]) {
         fn grow<T>(v: &mut Vec<T>, to: usize) {
             v.reserve_exact(to.saturating_sub(v.len()));
         }
-        grow(&mut self.of, to);
-        grow(&mut self.due, to);
-        grow(&mut self.soon, to);
-        grow(&mut self.ready, to);
+        grow(&mut self.of, places);
+        grow(&mut self.due, places);
+        grow(&mut self.sorting, places.div_ceil(64));
+        grow(&mut self.soon, there);
+        grow(&mut self.ready, there);
+    }
+
+    /// What [`List::reserve_to`] takes beside what is held: more bytes in all, and those of the largest array that is there until its new one is filled.
+    pub(super) fn growth(&self, [places, there]: [usize; 2]) -> [usize; 2] {
+        let sorting = self.sorting.capacity();
+        let all = [
+            grown::<Entry>(self.of.capacity(), places),
+            grown::<Due>(self.due.capacity(), places),
+            grown::<u64>(sorting, places.div_ceil(64)),
+            grown::<(u32, Due)>(self.soon.capacity(), there),
+            grown::<u32>(self.ready.capacity(), there),
+        ];
+        all.iter().fold([0; 2], |sum, g| [sum[0] + g[0], sum[1].max(g[1])])
+    }
+
+    /// There are so many places at least; in new ones is nothing.
+    #[inline]
+    pub(super) fn extend_to(&mut self, places: usize) {
+        if self.of.len() < places {
+            self.of.resize(places, Entry::NOTHING);
+            self.due.resize(places, Due::NEVER);
+            self.sorting.resize(places.div_ceil(64), 0);
+        }
+    }
+
+    /// Something is in a place.
+    #[inline]
+    pub(super) fn has(&self, at: u32) -> bool {
+        self.due.get(at as usize).is_some_and(|&d| d != Due::NEVER)
     }
 
     /// What is in a place.
     #[inline]
-    pub(super) fn get(&self, at: u32) -> Option<&Open> {
-        self.of.get(at as usize).filter(|o| o.node != NONE)
+    pub(super) fn get(&self, at: u32) -> Option<&Entry> {
+        self.of.get(at as usize).filter(|_| self.has(at))
     }
 
-    /// Adds an entry that is to be looked at at once; returns its place.
+    /// What is in a place, or was there last.
     #[inline]
-    pub(super) fn push(&mut self, open: Open) -> u32 {
-        let at = self.free;
-        match self.of.get_mut(at as usize) {
-            Some(place) => {
-                self.free = place.entry.split;
-                *place = open;
-                self.set_due(at, Due::NOW);
-                at
-            }
-            None => {
-                let at = self.of.len() as u32;
-                self.of.push(open);
-                self.due.push(Due::NEVER);
-                self.set_due(at, Due::NOW);
-                at
-            }
+    pub(super) fn last_at(&self, at: u32) -> Option<&Entry> {
+        self.of.get(at as usize)
+    }
+
+    /// Puts an entry, which is to be looked at at once, into a place.
+    #[inline]
+    pub(super) fn put(&mut self, at: u32, entry: Entry) {
+        if let Some(e) = self.of.get_mut(at as usize) {
+            *e = entry;
+            self.set_due(at, Due::NOW);
         }
+    }
+
+    /// What was taken out of a place is there again, and to be looked at at once.
+    #[inline]
+    pub(super) fn put_back(&mut self, at: u32) {
+        self.set_due(at, Due::NOW);
     }
 
     /// Takes out what is in a place.
     #[inline]
     pub(super) fn take_out(&mut self, at: u32) {
-        if let Some(o) = self.of.get_mut(at as usize).filter(|o| o.node != NONE) {
-            (o.node, o.entry.split) = (NONE, self.free);
-            self.due[at as usize] = Due::NEVER;
-            self.free = at;
+        if let Some(d) = self.due.get_mut(at as usize) {
+            *d = Due::NEVER;
         }
     }
 
@@ -183,16 +193,23 @@ impl List {
             }
             !is_due
         });
-        // What was put there, or told, more than once since.
-        ready.sort_unstable();
-        ready.dedup();
+        // Each once, though it was put there, or told, more than once since.
+        ready.iter().for_each(|&at| self.sorting[at as usize / 64] |= 1 << (at % 64));
+        ready.clear();
+        for (word, first) in self.sorting.iter_mut().zip((0u32..).step_by(64)).filter(|(w, _)| **w != 0) {
+            let mut left = std::mem::take(word);
+            while left != 0 {
+                ready.push(first + left.trailing_zeros());
+                left &= left - 1;
+            }
+        }
     }
 
     /// Place `k` of those that are due, and what is there; `None` if it was taken out.
     #[inline]
     pub(super) fn ready(&self, k: usize) -> Option<(u32, &Entry)> {
         let at = *self.ready.get(k)?;
-        self.get(at).map(|o| (at, &o.entry))
+        self.get(at).map(|e| (at, e))
     }
 }
 
@@ -220,7 +237,8 @@ mod tests {
         };
         let mut vector = move || DVec3::new(unit(), unit(), 0.1 * unit()) - DVec3::new(0.5, 0.5, 0.0);
         let (mut clock, mut list) = (Clocks::new(1.4), List::default());
-        list.reserve_to(600);
+        list.reserve_to([600; 2]);
+        list.extend_to(500);
         // When each place was told to be due.
         let mut told: BTreeMap<u32, Due> = BTreeMap::new();
         let (mut eye, mut angle, mut splits) = (DVec3::new(-0.4, 0.0, 0.05), 0.0f64, 0);
@@ -257,7 +275,7 @@ mod tests {
                 found_soon += found.len();
             }
             all_found += found.len();
-            let asked: Vec<Entry> = found.iter().map(|&p| list.get(p).unwrap().entry).collect();
+            let asked: Vec<Entry> = found.iter().map(|&p| *list.get(p).unwrap()).collect();
             let mut looked = Looked::default();
             clock.look(&clock.next(&judges), &asked, &mut looked);
             for (&place, (_, due)) in found.iter().zip(looked.each()) {
@@ -270,10 +288,19 @@ mod tests {
                 list.take_out(p);
                 told.remove(&p);
             }
-            while told.len() < 500 {
-                let place = list.push(Open { entry: entry(splits, vector()), node: splits });
-                assert_eq!(list.get(place).map(|o| o.node), Some(splits));
-                assert!(told.insert(place, Due::NOW).is_none() && place < 500);
+            for place in 0..500 {
+                if told.contains_key(&place) {
+                    continue;
+                }
+                assert!(!list.has(place) && list.get(place).is_none());
+                // The same again, or another.
+                if splits % 3 == 1 {
+                    list.put_back(place);
+                } else {
+                    list.put(place, entry(splits, vector()));
+                    assert_eq!(list.get(place).map(|e| e.split), Some(splits));
+                }
+                assert!(list.has(place) && told.insert(place, Due::NOW).is_none());
                 splits += 1;
             }
         }

@@ -1,6 +1,7 @@
 //! The mesh of a paged view, as buffers and as a mesh.
 
 use super::PagedView;
+use super::pool::APPLIED;
 use crate::Strips;
 use crate::aif::{MeshInput, NONE, Positions, Wedges};
 use crate::format::ByteRanges;
@@ -17,7 +18,10 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// The face of the progressive mesh in a slot of the index buffer; none in one that is free, or is not there.
     pub fn face_in(&self, slot: usize) -> Option<u32> {
-        self.face_in.get(slot).copied().filter(|&f| f != NONE)
+        let slot = u32::try_from(slot).ok().filter(|&s| (s as usize) < self.fans.corners.len())?;
+        let Some(k) = slot.checked_sub(self.shelf.head.base_faces) else { return Some(slot) };
+        let h = self.shelf.pool.get(k / 2).filter(|h| h.flags & APPLIED != 0)?;
+        (k % 2 == 0 || h.code.two_faces()).then(|| self.shelf.head.first_face(h.split) + k % 2)
     }
 
     /// The slots of the faces across the three edges of the face in a slot; `None` at borders, at edges of three and more faces, and where there is no face.
@@ -94,7 +98,7 @@ impl<S: ByteRanges> PagedView<S> {
             number.insert(v, number.len() as u32);
         }
         let mut slots: Vec<(u32, u32)> =
-            (0u32..).zip(&self.face_in).filter(|(_, f)| **f != NONE).map(|(s, &f)| (f, s)).collect();
+            (0..self.fans.corners.len()).filter_map(|s| Some((self.face_in(s)?, s as u32))).collect();
         slots.sort_unstable();
         let corners = || slots.iter().flat_map(|&(_, s)| self.fans.corners[s as usize]);
         let of = |v: u32| number.get(&v).copied().unwrap_or(0);

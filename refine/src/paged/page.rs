@@ -23,31 +23,19 @@ impl RowRef {
 pub(super) struct Base {
     pub(super) mesh: ProgressiveMesh,
     pub(super) links: BaseLinks,
-    /// Where each vertex is in the list of what can be applied.
-    pub(super) open_place: Vec<u32>,
     /// The node that each vertex is at.
     pub(super) node: Vec<u32>,
-    /// The slot of each face.
-    pub(super) slot: Vec<u32>,
     pub(super) wedge_vertex: Vec<u32>,
     pub(super) wedge_row: Vec<RowRef>,
 }
 
 impl Base {
-    /// The faces of `mesh` are those of a view: it has none here, but so many.
-    pub(super) fn new(mut mesh: ProgressiveMesh, faces: usize, links: BaseLinks) -> Base {
+    /// The faces of `mesh` are those of a view: it has none here.
+    pub(super) fn new(mut mesh: ProgressiveMesh, links: BaseLinks) -> Base {
         let n0 = mesh.base_vertices() as u32;
         let wedge_vertex = mesh.wedges.as_mut().map_or(Vec::new(), |w| std::mem::take(&mut w.base_vertex));
         let wedge_row = (0..wedge_vertex.len() as u32).map(|row| RowRef { page: NONE, row }).collect();
-        Base {
-            links,
-            open_place: vec![NONE; n0 as usize],
-            node: (0..n0).collect(),
-            slot: (0..faces as u32).collect(),
-            wedge_vertex,
-            wedge_row,
-            mesh,
-        }
+        Base { links, node: (0..n0).collect(), wedge_vertex, wedge_row, mesh }
     }
 
     pub(super) fn vertices(&self) -> usize {
@@ -56,25 +44,16 @@ impl Base {
 
     pub(super) fn bytes(&self) -> usize {
         self.mesh.bytes()
-            + 4 * (self.links.next.capacity() + self.open_place.capacity() + self.node.capacity())
-            + 4 * (self.slot.capacity() + self.wedge_vertex.capacity())
+            + 4 * (self.links.next.capacity() + self.node.capacity() + self.wedge_vertex.capacity())
             + size_of::<Packed>() * self.links.bounds.capacity()
             + size_of::<RowRef>() * self.wedge_row.capacity()
             + size_of::<Self>()
     }
 }
 
-/// A split is applied to what is drawn.
-pub(super) const APPLIED: u8 = 1;
-/// It is in the closure that is being gathered.
-pub(super) const MARKED: u8 = 2;
-/// It is asked for: needed, or one that is depends on it. With geomorphs by time others may be applied too.
-pub(super) const LED: u8 = 4;
-/// After the last step of a geomorph by time it was applied and not asked for.
-pub(super) const LINGERED: u8 = 8;
-
-/// A split: what the file says of it, and what has become of it. What is asked of a split is asked together, far from what was asked before: so it lies together, and memory is waited for once.
-#[derive(Clone, Debug)]
+/// What the file says of a split, one line of memory: what is asked of one is asked together, far from what was asked before.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(super) struct Record {
     pub(super) vertex: u32,
     /// Its cuts: edges of faces that are numbered as if every split made two, so that who made them is told by the number.
@@ -82,24 +61,12 @@ pub(super) struct Record {
     pub(super) right: u32,
     /// The node that it replaces.
     pub(super) parent: u32,
-    /// The split that replaces each of both nodes that it makes; [`NONE`] for a leaf.
+    /// The split that replaces each of both nodes that it makes, and its bounds; [`NONE`] for a leaf.
     pub(super) next: [u32; 2],
-    pub(super) bounds: Packed,
+    pub(super) bounds: [Packed; 2],
     /// Where its new vertex stands, if places are single.
     place: [f32; 3],
-    /// The node that its vertex is at; [`NONE`] if it is not in the mesh.
-    pub(super) node: u32,
-    /// The slots of its faces; [`NONE`] for none.
-    pub(super) slots: [u32; 2],
-    /// Where its nodes are in the list of what can be applied, and where it is in that of what can be undone.
-    pub(super) open_place: [u32; 2],
-    pub(super) last_place: u32,
     pub(super) code: SplitCode,
-    pub(super) flags: u8,
-    /// Splits asked for that depend on it.
-    pub(super) dependents: u16,
-    /// With geomorphs by time: applied splits that do.
-    pub(super) holders: u16,
 }
 
 /// A chunk of splits, with what is applied of it.
@@ -109,6 +76,10 @@ pub(super) struct Page {
     pub(super) first_face: u32,
     pub(super) first_wedge: u32,
     pub(super) of: Vec<Record>,
+    /// The record in the pool of every split that is asked for or drawn; [`NONE`] of others.
+    pub(super) hot: Vec<u32>,
+    /// Splits of the closure that is being gathered, a bit each.
+    marked: Vec<u64>,
     /// Of which splits the new vertices are in the mesh, a bit each: so that those are found without reading the others.
     there: Vec<u64>,
     /// Where new vertices stand, if places are double.
@@ -116,8 +87,6 @@ pub(super) struct Page {
     moved_positions: Positions,
     /// Moved vertices before every 64th split.
     moved_before: Vec<u32>,
-    /// Splits of later chunks that replace nodes made here, ascending, and their bounds.
-    pub(super) outside: Vec<(u32, Packed)>,
     /// By the ring rule what splits depend on beside what makes their vertex and their cuts, and their turns.
     pub(super) further: Lists,
     pub(super) rows: Vec<f32>,
@@ -132,7 +101,7 @@ pub(super) struct Page {
     pub(super) wedge_row: Vec<RowRef>,
     /// Of a row that changes a wedge, the one before.
     pub(super) row_before: Vec<RowRef>,
-    /// Splits that are applied or asked for: as long as there are any, the page stays.
+    /// Splits that are drawn or asked for: as long as there are any, the page stays.
     pub(super) in_use: usize,
     /// Since the last step of a geomorph by time some have begun or ceased to be asked for.
     pub(super) turned: bool,
@@ -210,25 +179,31 @@ impl Page {
         if turns.len() == count && !(0..count).all(in_turn) {
             return None;
         }
-        let of = (0..count).map(|k| Record {
-            vertex: block.splits.vertex[k],
-            left: by_maker(block.splits.left[k]),
-            right: by_maker(block.splits.right[k]),
-            parent: links.parent[k],
-            next: links.next[k],
-            bounds: own[k],
-            place: match &block.new_positions {
-                Positions::F32(p) => p[k],
-                Positions::F64(_) => [0.0; 3],
-            },
-            node: NONE,
-            slots: [NONE; 2],
-            open_place: [NONE; 2],
-            last_place: NONE,
-            code: block.splits.code[k],
-            flags: 0,
-            dependents: 0,
-            holders: 0,
+        // Of a later chunk's it says itself; what it does not say is none.
+        let bounds_of = |next: u32| match next.checked_sub(block.first).and_then(|k| own.get(k as usize)) {
+            _ if next == NONE => Some(Packed::default()),
+            Some(&b) => Some(b),
+            None => {
+                let at = links.outside.binary_search_by_key(&next, |o| o.0).ok()?;
+                Some(links.outside[at].1)
+            }
+        };
+        let ahead = |next: u32| bounds_of(next).map_or((NONE, Packed::default()), |b| (next, b));
+        let of = (0..count).map(|k| {
+            let ((a, of_a), (b, of_b)) = (ahead(links.next[k][0]), ahead(links.next[k][1]));
+            Record {
+                vertex: block.splits.vertex[k],
+                left: by_maker(block.splits.left[k]),
+                right: by_maker(block.splits.right[k]),
+                parent: links.parent[k],
+                next: [a, b],
+                bounds: [of_a, of_b],
+                place: match &block.new_positions {
+                    Positions::F32(p) => p[k],
+                    Positions::F64(_) => [0.0; 3],
+                },
+                code: block.splits.code[k],
+            }
         });
         let of = of.collect();
         fn shrink<T>(mut v: Vec<T>) -> Vec<T> {
@@ -240,6 +215,8 @@ impl Page {
             first_face: block.first_face,
             first_wedge: block.first_wedge,
             of,
+            hot: vec![NONE; count],
+            marked: vec![0; count.div_ceil(64)],
             there: vec![0; count.div_ceil(64)],
             places: match block.new_positions {
                 Positions::F32(_) => Vec::new(),
@@ -247,7 +224,6 @@ impl Page {
             },
             moved_positions: fit(block.moved_positions),
             moved_before,
-            outside: shrink(links.outside),
             further: links.further,
             rows: shrink(block.rows),
             present: shrink(block.present),
@@ -265,22 +241,21 @@ impl Page {
         })
     }
 
-    /// Sets or clears flags of split `k` of the page.
+    /// Marks split `k` of the page as gathered, or not.
     #[inline]
-    pub(super) fn set(&mut self, k: usize, flags: u8, on: bool) {
-        let was = self.of[k].flags;
-        let is = if on { was | flags } else { was & !flags };
-        self.of[k].flags = is;
-        let used = |f: u8| (f & (APPLIED | LED) != 0) as usize;
-        self.in_use = self.in_use + used(is) - used(was);
+    pub(super) fn mark(&mut self, k: usize, on: bool) {
+        set_bit(&mut self.marked, k, on);
     }
 
-    /// The new vertex of split `k` of the page is at a node; [`NONE`]: not in the mesh.
     #[inline]
-    pub(super) fn set_node(&mut self, k: usize, node: u32) {
-        self.of[k].node = node;
-        let (word, bit) = (&mut self.there[k / 64], 1 << (k % 64));
-        *word = if node == NONE { *word & !bit } else { *word | bit };
+    pub(super) fn is_marked(&self, k: usize) -> bool {
+        self.marked[k / 64] >> (k % 64) & 1 != 0
+    }
+
+    /// The new vertex of split `k` of the page is in the mesh, or not.
+    #[inline]
+    pub(super) fn set_there(&mut self, k: usize, on: bool) {
+        set_bit(&mut self.there, k, on);
     }
 
     /// The vertices made here that are in the mesh, by the splits that make them, ascending.
@@ -325,11 +300,12 @@ impl Page {
             Positions::F64(v) => of(v),
         };
         of(&self.of)
+            + of(&self.hot)
+            + of(&self.marked)
             + of(&self.there)
             + of(&self.places)
             + points(&self.moved_positions)
             + of(&self.moved_before)
-            + of(&self.outside)
             + of(&self.further.starts)
             + of(&self.further.on)
             + of(&self.further.turns)
@@ -353,10 +329,16 @@ impl Page {
         let others = raw.saturating_sub((18 + point) * count);
         let attributes = 12 * count * (wedges > 0) as u64 + 12 * wedges + others;
         let places = if point > 12 { point * count } else { 0 };
-        let records = size_of::<Record>() as u64 * count + count.div_ceil(64) * (4 + 8);
+        let records = (size_of::<Record>() as u64 + 4) * count + count.div_ceil(64) * (4 + 8 + 8);
         let all = outside + others + attributes + places + records;
         usize::try_from(all).unwrap_or(usize::MAX / 4) + size_of::<Page>() + 64
     }
+}
+
+#[inline]
+fn set_bit(of: &mut [u64], k: usize, on: bool) {
+    let (word, bit) = (&mut of[k / 64], 1 << (k % 64));
+    *word = if on { *word | bit } else { *word & !bit };
 }
 
 /// Where the attributes of each split of a block are. `None` if they are not all there.

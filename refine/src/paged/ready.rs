@@ -1,7 +1,7 @@
 //! Memory asked for ahead: what the next splits touch is read for all of them, step by step, so that it is waited for together and not dozens of times for each. It changes nothing but the time.
 
 use super::PagedView;
-use super::page::{LED, Record};
+use super::shelf::AtHand;
 use crate::aif::NONE;
 use crate::format::ByteRanges;
 
@@ -28,13 +28,6 @@ impl<'a> Reads<'a> {
         }
     }
 
-    /// A record reaches over two lines.
-    #[inline]
-    fn ask_for(&mut self, r: &'a Record) {
-        self.ask(&r.vertex);
-        self.ask(&r.last_place);
-    }
-
     #[inline]
     fn wait(&mut self) {
         std::hint::black_box(self.of[..self.n].iter().fold(0, |sum, x| sum ^ **x));
@@ -43,107 +36,100 @@ impl<'a> Reads<'a> {
 }
 
 impl<S: ByteRanges> PagedView<S> {
-    /// Before splits, [`LOT`] at most, are applied; those whose pages are not there are left out.
-    pub(super) fn ready_to_apply(&self, lot: &[u32]) {
-        let mut needed = [0; 2 * LOT];
+    /// Before splits, [`LOT`] at most, are applied; those whose pages are not there are left out. Says where they are.
+    pub(super) fn ready_to_apply(&self, lot: &[u32]) -> [Option<AtHand>; LOT] {
+        let mut needed = [0; LOT];
         let mut n = 0;
-        self.read_around(lot, |d| {
+        let at_hand = self.read_around(lot, |d| {
             if n < needed.len() {
                 needed[n] = d;
                 n += 1;
             }
         });
         // What they depend on comes with them.
-        for part in needed[..n].chunks(LOT) {
-            self.read_around(part, |_| ());
+        if n > 0 {
+            self.read_around(&needed[..n], |_| ());
         }
-    }
-
-    /// The records of these, [`LOT`] at most, read.
-    fn records_of<'a>(&'a self, lot: &[u32], reads: &mut Reads<'a>) -> [Option<&'a Record>; LOT] {
-        let mut of = [None; LOT];
-        for (of, &i) in of.iter_mut().zip(lot) {
-            *of = self.shelf.record(i);
-            of.iter().for_each(|r| reads.ask_for(r));
-        }
-        reads.wait();
-        of
+        at_hand
     }
 
     /// What applying these takes; `tell` is told what they depend on and is not asked for.
-    fn read_around(&self, lot: &[u32], mut tell: impl FnMut(u32)) {
+    fn read_around(&self, lot: &[u32], mut tell: impl FnMut(u32)) -> [Option<AtHand>; LOT] {
         let shelf = &self.shelf;
         let mut reads = Reads::new();
-        let mut of = self.records_of(lot, &mut reads);
-        // The splits that they depend on, of which two make the faces of their cuts; the vertex's, and those that come next.
-        let mut needs = [[None; 3]; LOT];
-        let mut sides = [[0; 2]; LOT];
-        for (((of, needs), sides), &i) in of.iter_mut().zip(&mut needs).zip(&mut sides).zip(lot) {
-            let Some(r) = *of else { continue };
-            if r.flags & LED != 0 {
-                *of = None;
-                continue;
+        let mut of = [None; LOT];
+        for (of, &i) in of.iter_mut().zip(lot) {
+            if let Some((p, k)) = shelf.page(i) {
+                *of = Some((p, k));
+                reads.ask(&p.of[k].vertex);
+                reads.ask(&p.hot[k]);
             }
-            let found = [(shelf.maker(r.parent), 0), shelf.half_of_cut(r.left), shelf.half_of_cut(r.right)];
-            *sides = [found[1].1, found[2].1];
-            for (need, (d, _)) in needs.iter_mut().zip(found) {
-                *need = if d == NONE { None } else { shelf.record(d).map(|r| (d, r)) };
-                need.iter().for_each(|(_, r)| reads.ask_for(r));
-            }
-            // The vertex is mostly one that is made by another split than its node.
-            let maker = r.vertex.wrapping_sub(shelf.head.base_vertices);
-            for j in [maker, r.next[0], r.next[1]] {
-                if j < shelf.head.splits && j != i {
-                    shelf.record(j).iter().for_each(|r| reads.ask_for(r));
+        }
+        reads.wait();
+        // The splits that they depend on, of which two make the faces of their cuts, and the vertex's: mostly another than its node's.
+        for (p, k) in of.iter().flatten().filter(|(p, k)| p.hot[*k] == NONE) {
+            let r = &p.of[*k];
+            let maker = r.vertex.checked_sub(shelf.head.base_vertices).unwrap_or(NONE);
+            for d in shelf.needs_of(r).into_iter().chain([maker]).chain(p.further.of(*k).iter().copied()) {
+                if let Some(h) = p.hot.get(d.wrapping_sub(p.first) as usize) {
+                    reads.ask(h);
+                } else if let Some((p, k)) = shelf.page(d) {
+                    reads.ask(&p.hot[k]);
                 }
             }
         }
         reads.wait();
+        let mut at_hand = [None; LOT];
         let mut slots = [[NONE; 2]; LOT];
-        for (((of, needs), sides), slots) in of.iter().zip(&needs).zip(&sides).zip(&mut slots) {
-            let Some(r) = of else { continue };
-            for (d, need) in needs.iter().flatten() {
-                if need.flags & LED == 0 {
-                    tell(*d);
-                } else if let Some(o) = self.last.get(need.last_place) {
-                    reads.ask(&o.node);
-                }
+        for (((of, at_hand), slots), &i) in of.iter().zip(&mut at_hand).zip(&mut slots).zip(lot) {
+            let Some((p, k)) = of else { continue };
+            let Some(at) = shelf.at_hand(i) else { continue };
+            let r = &p.of[*k];
+            for &h in at.needs.iter().chain([&at.maker]) {
+                shelf.pool.of.get(h as usize).iter().for_each(|r| reads.ask(&r.split));
             }
-            let open = shelf.open_place(r.parent);
-            self.open.get(open).iter().for_each(|o| reads.ask(&o.node));
-            for ((slot, need), side) in slots.iter_mut().zip(&needs[1..]).zip(sides) {
-                *slot = need.map_or(NONE, |(_, r)| r.slots[*side]);
+            if !at.whole {
+                let needs = shelf.needs_of(r).into_iter().chain(p.further.of(*k).iter().copied());
+                needs.filter(|&d| d != NONE && shelf.hot(d) == NONE).for_each(&mut tell);
+            }
+            let place = shelf.open_place_of(at.needs[0], r.parent);
+            self.open.last_at(place).iter().for_each(|e| reads.ask(&e.split));
+            for ((slot, &h), cut) in slots.iter_mut().zip(&at.needs[1..]).zip([r.left, r.right]) {
+                let (maker, side) = shelf.half_of_cut(cut);
+                *slot = match (maker, h) {
+                    (NONE, _) => cut >> 2,
+                    (_, NONE) => NONE,
+                    _ => shelf.first_slot(h) + side as u32,
+                };
             }
             self.ask_for_faces(slots.iter().copied(), &mut reads);
+            *at_hand = Some(at);
         }
         reads.wait();
         for slots in &slots[..lot.len().min(LOT)] {
             slots.iter().for_each(|&s| self.ask_for_faces(self.across(s), &mut reads));
         }
         reads.wait();
+        at_hand
     }
 
-    /// Before splits, [`LOT`] at most, are undone.
+    /// Before splits, [`LOT`] records at most, are undone.
     pub(super) fn ready_to_undo(&self, lot: &[u32]) {
         let shelf = &self.shelf;
         let mut reads = Reads::new();
-        let of = self.records_of(lot, &mut reads);
-        for r in of.iter().flatten() {
-            for d in shelf.needs_of(r).into_iter().filter(|&d| d != NONE) {
-                shelf.record(d).iter().for_each(|r| reads.ask_for(r));
-            }
-            let maker = r.vertex.wrapping_sub(shelf.head.base_vertices);
-            if maker < shelf.head.splits {
-                shelf.record(maker).iter().for_each(|r| reads.ask_for(r));
-            }
-            for place in r.open_place {
-                self.open.get(place).iter().for_each(|o| reads.ask(&o.node));
-            }
-            self.ask_for_faces(r.slots.into_iter(), &mut reads);
+        for &h in lot {
+            shelf.pool.of.get(h as usize).iter().for_each(|r| reads.ask(&r.split));
+            let first = shelf.first_slot(h);
+            self.ask_for_faces([first, first + 1].into_iter(), &mut reads);
         }
         reads.wait();
-        for r in of.iter().flatten() {
-            r.slots.iter().for_each(|&s| self.ask_for_faces(self.across(s), &mut reads));
+        for &h in lot {
+            let Some(r) = shelf.pool.get(h) else { continue };
+            for &d in r.needs.iter().chain([&r.maker]) {
+                shelf.pool.of.get(d as usize).iter().for_each(|r| reads.ask(&r.split));
+            }
+            let first = shelf.first_slot(h);
+            self.ask_for_faces(self.across(first).chain(self.across(first + 1)), &mut reads);
         }
         reads.wait();
     }

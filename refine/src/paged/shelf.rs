@@ -2,7 +2,8 @@
 
 use super::PagedError;
 use super::ahead::{Ahead, Made};
-use super::page::{APPLIED, Base, LED, MARKED, Page, Record, RowRef};
+use super::page::{Base, Page, Record, RowRef};
+use super::pool::{APPLIED, Hot, LED, NEEDS, Pool};
 use crate::aif::NONE;
 use crate::format::{
     ByteRanges, CONTRADICTS, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, Room, pages,
@@ -55,6 +56,8 @@ pub(super) struct Shelf<S> {
     /// The chunk that holds every 1024th split.
     index: Vec<u32>,
     pages: Vec<Option<Box<Page>>>,
+    /// What is asked for or drawn of them.
+    pub(super) pool: Pool,
     /// Bytes of the pages that are there.
     held: usize,
     resident: usize,
@@ -115,6 +118,19 @@ pub(super) fn read_page(source: &(impl ByteRanges + ?Sized), head: &MeshHead, wa
     Ok((page, bytes.len() as u64))
 }
 
+/// Where a split is that is to be applied, found before.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AtHand {
+    pub(super) chunk: u32,
+    pub(super) k: u32,
+    /// The record of the split that makes its vertex; [`NONE`] of the base.
+    pub(super) maker: u32,
+    /// Those of what it depends on.
+    pub(super) needs: [u32; NEEDS],
+    /// All of what it depends on has a record, and all are named.
+    pub(super) whole: bool,
+}
+
 /// Splits between two entries of the index.
 const STRIDE: usize = 1024;
 
@@ -137,6 +153,13 @@ pub(super) enum Fetch {
     There,
     /// It is to be fetched, and then takes so many bytes at most.
     Missing(usize),
+}
+
+impl<S> Shelf<S> {
+    /// Resident pages, ascending, and what is asked for or drawn of them.
+    pub(super) fn with_pool(&mut self) -> (impl Iterator<Item = &mut Page>, &mut Pool) {
+        (self.pages.iter_mut().filter_map(|p| p.as_deref_mut()), &mut self.pool)
+    }
 }
 
 impl<S: ByteRanges> Shelf<S> {
@@ -228,7 +251,7 @@ impl<S: ByteRanges> Shelf<S> {
             return Err(base_chunk.damage(CONTRADICTS).into());
         }
         let links_of_faces = link_faces(&faces, mesh.base_vertices());
-        let base = Base::new(mesh, corners.len(), links);
+        let base = Base::new(mesh, links);
         let pages = chunks.iter().map(|_| None).collect();
         let shelf = Shelf {
             head: Arc::new(head),
@@ -237,6 +260,7 @@ impl<S: ByteRanges> Shelf<S> {
             firsts,
             index,
             pages,
+            pool: Pool::default(),
             held: 0,
             resident: 0,
             clock: 0,
@@ -263,6 +287,7 @@ impl<S: ByteRanges> Shelf<S> {
             + 8 * self.pages.capacity()
             + size_of::<Chunk>() * directory.chunks.capacity() / (directory.meshes as usize).max(1)
             + self.held
+            + size_of::<Hot>() * self.pool.of.capacity()
             + self.ahead.bytes()
     }
 
@@ -336,11 +361,6 @@ impl<S: ByteRanges> Shelf<S> {
     }
 
     #[inline]
-    pub(super) fn record_mut(&mut self, i: u32) -> Option<&mut Record> {
-        self.page_mut(i).map(|(p, k)| &mut p.of[k])
-    }
-
-    #[inline]
     pub(super) fn page_mut(&mut self, i: u32) -> Option<(&mut Page, usize)> {
         let c = self.chunk_of(i);
         let page = self.pages.get_mut(c)?.as_deref_mut()?;
@@ -359,9 +379,118 @@ impl<S: ByteRanges> Shelf<S> {
         page.map_or((0, 0), |p| (p.first, p.of.len() as u32))
     }
 
-    /// The flags of split `i`; none if its page is not there.
+    /// The flags of split `i`; none of one that is neither asked for nor drawn.
     pub(super) fn flags(&self, i: u32) -> u8 {
-        self.page(i).map_or(0, |(p, k)| p.of[k].flags)
+        self.hot_of(i).map_or(0, |h| h.flags)
+    }
+
+    /// The record in the pool of split `i`; [`NONE`] of one that is neither asked for nor drawn.
+    #[inline]
+    pub(super) fn hot(&self, i: u32) -> u32 {
+        self.page(i).map_or(NONE, |(p, k)| p.hot[k])
+    }
+
+    #[inline]
+    pub(super) fn hot_of(&self, i: u32) -> Option<&Hot> {
+        self.pool.get(self.hot(i))
+    }
+
+    /// A split that is at hand is asked for: it has a record from now on, if it has none. The second says if the pool has grown.
+    pub(super) fn come(&mut self, i: u32, at: &AtHand, needs: &[u32]) -> Option<(u32, bool)> {
+        let page = self.pages.get_mut(at.chunk as usize)?.as_deref_mut()?;
+        let (r, hot) = (page.of.get(at.k as usize)?, page.hot.get_mut(at.k as usize)?);
+        if *hot != NONE {
+            return Some((*hot, false));
+        }
+        let mut named = [NONE; NEEDS];
+        named.iter_mut().zip(needs).for_each(|(n, &h)| *n = h);
+        let (h, more) = self.pool.put(Hot {
+            split: i,
+            node: NONE,
+            needs: named,
+            vertex: r.vertex,
+            maker: at.maker,
+            parent: r.parent,
+            dependents: 0,
+            holders: 0,
+            code: r.code,
+            flags: LED,
+            more: needs.len() > NEEDS,
+        });
+        *hot = h;
+        page.in_use += 1;
+        Some((h, more))
+    }
+
+    /// Where split `i` is, if its page is there, and the records of what it depends on, if all has them and can be named.
+    pub(super) fn at_hand(&self, i: u32) -> Option<AtHand> {
+        let chunk = self.chunk_of(i);
+        let page = self.pages.get(chunk)?.as_deref()?;
+        let k = i.wrapping_sub(page.first);
+        let r = page.of.get(k as usize)?;
+        let hot = |d: u32| match page.hot.get(d.wrapping_sub(page.first) as usize) {
+            Some(&h) => h,
+            None => self.hot(d),
+        };
+        let maker = r.vertex.checked_sub(self.head.base_vertices).map_or(NONE, hot);
+        let (mut needs, mut whole) = ([NONE; NEEDS], true);
+        for (need, d) in needs.iter_mut().zip(self.needs_of(r)).filter(|(_, d)| *d != NONE) {
+            *need = hot(d);
+            whole &= *need != NONE;
+        }
+        if self.by_rings() {
+            let further = page.further.of(k as usize);
+            whole &= further.len() <= NEEDS - 3;
+            for (need, &d) in needs[3..].iter_mut().zip(further) {
+                *need = hot(d);
+                whole &= *need != NONE;
+            }
+        }
+        Some(AtHand { chunk: chunk as u32, k, maker, needs, whole })
+    }
+
+    /// What the file says of a split that is at hand, if its page is still there; it is in use.
+    #[inline]
+    pub(super) fn use_page(&mut self, at: &AtHand) -> Option<&Page> {
+        let clock = self.clock;
+        let page = self.pages.get_mut(at.chunk as usize)?.as_deref_mut()?;
+        page.stamp = clock;
+        Some(page)
+    }
+
+    /// What is neither asked for nor drawn any more has no record.
+    pub(super) fn go(&mut self, h: u32) {
+        let Some(i) = self.pool.of.get(h as usize).map(|r| r.split) else { return };
+        let clock = self.clock;
+        if let Some((page, k)) = self.page_mut(i) {
+            page.hot[k] = NONE;
+            page.in_use -= 1;
+            page.stamp = clock;
+        }
+        self.pool.take_out(h);
+    }
+
+    /// The records of all that split `i` depends on, what makes its node and the faces of its cuts first; [`NONE`] of the base, and of what has none.
+    ///
+    /// Errors: its page is not there.
+    pub(super) fn needs_into(&self, i: u32, out: &mut Vec<u32>) -> Result<(), Damage> {
+        out.clear();
+        let (page, k) = self.page(i).ok_or(Damage::Fan(i as usize))?;
+        let first = self.needs_of(&page.of[k]);
+        let hot = |&d: &u32| if d == NONE { NONE } else { self.hot(d) };
+        out.extend(first.iter().chain(self.further(i)).map(hot));
+        Ok(())
+    }
+
+    /// The same of a record; of its split, whose page is there.
+    pub(super) fn needs_of_hot(&self, h: u32, out: &mut Vec<u32>) -> Result<(), Damage> {
+        let Some(r) = self.pool.get(h) else { return Err(Damage::Fan(h as usize)) };
+        if r.more {
+            return self.needs_into(r.split, out);
+        }
+        out.clear();
+        out.extend_from_slice(&r.needs);
+        Ok(())
     }
 
     /// What it takes to have the page of split `i`. Notes that it is in use.
@@ -444,32 +573,27 @@ impl<S: ByteRanges> Shelf<S> {
         self.pages.iter().filter_map(|p| p.as_deref())
     }
 
-    pub(super) fn all_mut(&mut self) -> impl Iterator<Item = &mut Page> {
-        self.pages.iter_mut().filter_map(|p| p.as_deref_mut())
-    }
-
     #[inline]
     pub(super) fn is_applied(&self, i: u32) -> bool {
-        self.page(i).is_some_and(|(p, k)| p.of[k].flags & APPLIED != 0)
+        self.flags(i) & APPLIED != 0
     }
 
     /// Split `i` is asked for.
     #[inline]
     pub(super) fn is_led(&self, i: u32) -> bool {
-        self.page(i).is_some_and(|(p, k)| p.of[k].flags & LED != 0)
+        self.flags(i) & LED != 0
     }
 
     /// Marks split `i` as gathered, or not, if its page is there.
     pub(super) fn mark(&mut self, i: u32, on: bool) {
         if let Some((p, k)) = self.page_mut(i) {
-            let flags = &mut p.of[k].flags;
-            *flags = if on { *flags | MARKED } else { *flags & !MARKED };
+            p.mark(k, on);
         }
     }
 
     #[inline]
     pub(super) fn is_marked(&self, i: u32) -> bool {
-        self.page(i).is_some_and(|(p, k)| p.of[k].flags & MARKED != 0)
+        self.page(i).is_some_and(|(p, k)| p.is_marked(k))
     }
 
     /// The node that split `i` replaces, and its vertex; `None` if its page is not there.
@@ -544,54 +668,26 @@ impl<S: ByteRanges> Shelf<S> {
         if let Some(&next) = base.next.get(node as usize) {
             return (next, base.bounds[node as usize]);
         }
-        let Some((p, k, side)) = self.at_node(node) else { return (NONE, Packed::default()) };
-        let next = p.of[k].next[side];
-        if next == NONE {
-            return (NONE, Packed::default());
-        }
-        if let Some(own) = p.of.get(next.wrapping_sub(p.first) as usize) {
-            return (next, own.bounds);
-        }
-        // Its page says the same: that is there mostly, and found sooner.
-        if let Some(there) = self.record(next) {
-            return (next, there.bounds);
-        }
-        match p.outside.binary_search_by_key(&next, |o| o.0) {
-            Ok(at) => (next, p.outside[at].1),
-            Err(_) => (NONE, Packed::default()),
+        match self.at_node(node) {
+            Some((p, k, side)) => (p.of[k].next[side], p.of[k].bounds[side]),
+            None => (NONE, Packed::default()),
         }
     }
 
+    /// The place of a node in the list of what could come next, of the record of the split that makes it ([`NONE`] of the base); [`NONE`] if that is not asked for. The places of the two nodes of a record follow each other.
     #[inline]
-    pub(super) fn open_place(&self, node: u32) -> u32 {
-        match self.base.open_place.get(node as usize) {
-            Some(&place) => place,
-            None => self.at_node(node).map_or(NONE, |(p, k, side)| p.of[k].open_place[side]),
+    pub(super) fn open_place_of(&self, maker: u32, node: u32) -> u32 {
+        match node.checked_sub(self.head.base_vertices) {
+            None => node,
+            Some(_) if maker == NONE => NONE,
+            Some(k) => self.first_open(maker) + (k & 1),
         }
     }
 
+    /// The place of the first node of a record.
     #[inline]
-    pub(super) fn set_open_place(&mut self, node: u32, place: u32) {
-        if let Some(at) = self.base.open_place.get_mut(node as usize) {
-            *at = place;
-            return;
-        }
-        let j = node - self.head.base_vertices;
-        if let Some((p, k)) = self.page_mut(j >> 1) {
-            p.of[k].open_place[(j & 1) as usize] = place;
-        }
-    }
-
-    #[inline]
-    pub(super) fn last_place(&self, i: u32) -> u32 {
-        self.record(i).map_or(NONE, |r| r.last_place)
-    }
-
-    #[inline]
-    pub(super) fn set_last_place(&mut self, i: u32, place: u32) {
-        if let Some((p, k)) = self.page_mut(i) {
-            p.of[k].last_place = place;
-        }
+    pub(super) fn first_open(&self, h: u32) -> u32 {
+        self.head.base_vertices + 2 * h
     }
 
     /// The node that vertex `v` is at; [`NONE`] if it is not in the mesh.
@@ -599,29 +695,32 @@ impl<S: ByteRanges> Shelf<S> {
     pub(super) fn node(&self, v: u32) -> u32 {
         match v.checked_sub(self.head.base_vertices) {
             None => self.base.node[v as usize],
-            Some(i) => self.record(i).map_or(NONE, |r| r.node),
+            Some(i) => self.hot_of(i).map_or(NONE, |h| h.node),
         }
     }
 
+    /// The node that a vertex is at, of which the record of the split that makes it is known; [`NONE`] of the base.
     #[inline]
-    pub(super) fn set_node(&mut self, v: u32, node: u32) {
-        match v.checked_sub(self.head.base_vertices) {
-            None => self.base.node[v as usize] = node,
-            Some(i) => {
-                if let Some((p, k)) = self.page_mut(i) {
-                    p.set_node(k, node);
-                }
-            }
+    pub(super) fn node_of(&self, v: u32, maker: u32) -> u32 {
+        match self.base.node.get(v as usize) {
+            Some(&node) => node,
+            None => self.pool.get(maker).map_or(NONE, |h| h.node),
         }
     }
 
-    /// The slot of the face of a cut of a [`Record`]; [`NONE`] if it is not in the mesh.
+    /// The same for a vertex that is in the mesh.
     #[inline]
-    pub(super) fn slot_of_cut(&self, cut: u32) -> u32 {
-        match self.half_of_cut(cut) {
-            (NONE, _) => self.base.slot.get((cut >> 2) as usize).copied().unwrap_or(NONE),
-            (i, side) => self.record(i).map_or(NONE, |r| r.slots[side]),
+    pub(super) fn set_node_of(&mut self, v: u32, maker: u32, node: u32) {
+        match self.base.node.get_mut(v as usize) {
+            Some(at) => *at = node,
+            None => self.pool.get_mut(maker).into_iter().for_each(|h| h.node = node),
         }
+    }
+
+    /// The first slot of a record's faces.
+    #[inline]
+    pub(super) fn first_slot(&self, h: u32) -> u32 {
+        self.head.base_faces + 2 * h
     }
 
     /// The chunk that makes wedge `w`, which is none of the base's.
@@ -731,15 +830,6 @@ impl<S: ByteRanges> Shelf<S> {
             }
             k = p.of[local].parent;
         }
-    }
-
-    /// Where vertex `v`, which is in the mesh, stands about the origin of the bounds if nothing moves it.
-    pub(super) fn local_place(&self, v: u32) -> Result<Vec3, PagedError> {
-        let place = match v.checked_sub(self.head.base_vertices) {
-            None => self.base.mesh.base_positions.get(v as usize),
-            Some(i) => self.page(i).map(|(p, k)| p.place(k)).ok_or(Damage::Fan(i as usize))?,
-        };
-        Ok((place - self.base.links.origin).as_vec3())
     }
 
     /// Where a node stands about the origin of the bounds.

@@ -3,7 +3,8 @@
 //! By time, what is asked for and what is drawn are two cuts in the same pages: [`PagedView::adapt`] changes the first, a step applies and undoes splits of the second. What lingers keeps its pages.
 
 use super::PagedView;
-use super::page::{APPLIED, LED, LINGERED, Page};
+use super::page::Page;
+use super::pool::{APPLIED, LED, LINGERED};
 use super::{PagedError, shelf::Shelf};
 use crate::aif::NONE;
 use crate::format::ByteRanges;
@@ -31,7 +32,7 @@ impl<S: ByteRanges> PagedView<S> {
         self.motions = frames.map(Motions::new);
         if begins {
             // What is drawn is what is asked for.
-            self.shelf.all_mut().flat_map(|p| &mut p.of).for_each(|r| r.holders = r.dependents);
+            self.shelf.pool.of.iter_mut().for_each(|r| r.holders = r.dependents);
         }
         Ok(())
     }
@@ -77,7 +78,7 @@ impl<S: ByteRanges> PagedView<S> {
             let (first, count) = self.shelf.resident_run(c);
             for i in first..first + count {
                 if self.shelf.flags(i) & (APPLIED | LED) == LED {
-                    self.split_faces(i)?;
+                    self.draw(i)?;
                     done.splits += 1;
                 }
             }
@@ -86,7 +87,7 @@ impl<S: ByteRanges> PagedView<S> {
             let (first, count) = self.shelf.resident_run(c);
             for i in (first..first + count).rev() {
                 if self.shelf.flags(i) & (APPLIED | LED) == APPLIED {
-                    self.unsplit_faces(i)?;
+                    self.undraw(i)?;
                     done.collapses += 1;
                 }
             }
@@ -102,15 +103,7 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// Remembers what lingers.
     fn stepped(&mut self) {
-        for p in self.shelf.all_mut().filter(|p| p.turned || p.lingered > 0) {
-            p.lingered = 0;
-            for f in p.of.iter_mut().map(|r| &mut r.flags) {
-                let lingers = *f & (APPLIED | LED) == APPLIED;
-                *f = if lingers { *f | LINGERED } else { *f & !LINGERED };
-                p.lingered += usize::from(lingers);
-            }
-            p.turned = false;
-        }
+        self.shelf.stepped();
         (self.ahead, self.at_once) = (0, false);
     }
 
@@ -132,6 +125,21 @@ impl<S: ByteRanges> PagedView<S> {
 }
 
 impl<S> Shelf<S> {
+    /// Remembers what lingers.
+    fn stepped(&mut self) {
+        let (pages, pool) = self.with_pool();
+        for p in pages.filter(|p| p.turned || p.lingered > 0) {
+            p.lingered = 0;
+            for &h in &p.hot {
+                let Some(r) = pool.get_mut(h) else { continue };
+                let lingers = r.flags & (APPLIED | LED) == APPLIED;
+                r.flags = if lingers { r.flags | LINGERED } else { r.flags & !LINGERED };
+                p.lingered += usize::from(lingers);
+            }
+            p.turned = false;
+        }
+    }
+
     /// The splits of resident pages of which `of` is true, each behind what it depends on. `pages`: of those only.
     fn splits_where(&self, pages: impl Fn(&Page) -> bool, of: impl Fn(u8) -> bool) -> Vec<u32>
     where
@@ -140,7 +148,8 @@ impl<S> Shelf<S> {
         let mut out = Vec::new();
         for p in self.all().filter(|p| pages(p)) {
             let from = out.len();
-            out.extend((p.first..).zip(&p.of).filter(|(_, r)| of(r.flags)).map(|(i, _)| i));
+            let flags = |h: u32| self.pool.get(h).map_or(0, |r| r.flags);
+            out.extend((p.first..).zip(&p.hot).filter(|(_, h)| of(flags(**h))).map(|(i, _)| i));
             if self.by_rings() {
                 out[from..].sort_unstable_by_key(|&i| self.order_key(i));
             }
@@ -183,9 +192,9 @@ impl<S: ByteRanges> Cut for PagedView<S> {
     }
 
     fn entry(&self, i: u32) -> Entry {
-        let bounds = self.shelf.record(i).map_or_else(Default::default, |r| r.bounds);
-        let centre = self.shelf.local_centre(self.parent(i).0);
-        Entry::new(i, centre.unwrap_or_default(), bounds)
+        // It was put there when the split was asked for.
+        let entry = self.last.last_at(self.shelf.hot(i)).filter(|e| e.split == i);
+        entry.copied().unwrap_or(Entry::NOTHING)
     }
 
     fn place(&self, node: u32, _: u32) -> DVec3 {
@@ -213,14 +222,19 @@ impl<S: ByteRanges> Stage for PagedView<S> {
     }
 
     fn is_free(&self, i: u32) -> bool {
-        self.shelf.record(i).is_some_and(|r| r.flags & APPLIED != 0 && r.holders == 0)
+        self.shelf.hot_of(i).is_some_and(|r| r.flags & APPLIED != 0 && r.holders == 0)
     }
 
     fn draw(&mut self, i: u32) -> Result<(), PagedError> {
-        self.split_faces(i)
+        self.split_faces(self.shelf.hot(i))
     }
 
     fn undraw(&mut self, i: u32) -> Result<(), PagedError> {
-        self.unsplit_faces(i)
+        let h = self.shelf.hot(i);
+        self.unsplit_faces(h)?;
+        if self.shelf.pool.get(h).is_none_or(|r| r.flags & LED == 0) {
+            self.shelf.go(h);
+        }
+        Ok(())
     }
 }

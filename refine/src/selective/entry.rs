@@ -1,5 +1,6 @@
 //! A split with what is needed to decide about it.
 
+use crate::aif::NONE;
 use crate::hierarchy::{Cone, Direction, Hierarchy, Packed, unpack};
 use glam::Vec3;
 
@@ -15,6 +16,16 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
+    /// Of no split.
+    pub(crate) const NOTHING: Entry = Entry {
+        centre: Vec3::ZERO,
+        radius: 0.0,
+        error: 0.0,
+        split: NONE,
+        cone: Cone(0),
+        direction: Direction::ANY,
+    };
+
     pub(crate) fn of(h: &Hierarchy, i: u32) -> Entry {
         Entry::placed(h, i, h.local_centre(i))
     }
