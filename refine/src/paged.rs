@@ -26,6 +26,7 @@ mod page;
 mod pool;
 mod ready;
 mod shelf;
+mod sight;
 mod timed;
 
 pub use adapt::{PagedDone, PagedLimits};

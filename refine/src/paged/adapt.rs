@@ -148,6 +148,10 @@ impl<S: ByteRanges> PagedView<S> {
         let cut = std::mem::replace(&mut self.cut, true);
         let all = cut || !stands;
         self.made.clear();
+        if self.shelf.looks_ahead {
+            let clock = &self.clock;
+            self.shelf.foresee(|e| clock.will_want(e));
+        }
         let mut desk = Desk::new(&judges, &self.clock);
         self.coarsen(&mut desk, all, &mut frame)?;
         // Once more without what lingers, if it takes the room.
@@ -309,7 +313,7 @@ impl<S: ByteRanges> PagedView<S> {
             if self.shelf.looks_ahead {
                 // Those on top of the queue come next.
                 let next = self.queue.iter().take(IN_SIGHT).map(|q| q.1.0);
-                lot.iter().copied().chain(next).for_each(|i| _ = self.shelf.wish(i));
+                lot.iter().copied().chain(next).for_each(|i| _ = self.shelf.wish(i, true));
             }
             let at_hand = self.ready_to_apply(&lot);
             for (k, (&i, at)) in lot.iter().zip(&at_hand).enumerate() {
@@ -345,7 +349,7 @@ impl<S: ByteRanges> PagedView<S> {
         self.clock.look(&desk.next, &desk.entries, &mut desk.looked);
         for ((&place, e), (wanted, due)) in desk.places.iter().zip(&desk.entries).zip(desk.looked.each()) {
             // Until it is applied.
-            let due = if wanted { Due::NOW } else { self.ahead_of(e, due, &desk.judges) };
+            let due = if wanted { Due::NOW } else { self.ahead_of(e, due) };
             self.open.set_due(place, due);
             if wanted {
                 self.enqueue(desk.judges.rank(e), e.split, frame);
@@ -354,12 +358,12 @@ impl<S: ByteRanges> PagedView<S> {
     }
 
     /// When to look again at a split that is not needed now: if its page is not there, some frames before it can be needed. If it is then as if it would be, its page is made by another thread.
-    fn ahead_of(&mut self, e: &Entry, due: Due, judges: &Judges<'_>) -> Due {
+    fn ahead_of(&mut self, e: &Entry, due: Due) -> Due {
         if !self.shelf.looks_ahead || !self.shelf.is_missing(e.split) {
             return due;
         }
         let (early, soon) = self.clock.ahead_of(due);
-        if soon && self.clock.will_want(judges, e) && self.shelf.wish(e.split) { due } else { early }
+        if soon && self.clock.will_want(e) && self.shelf.wish(e.split, false) { due } else { early }
     }
 
     /// Looks at what the splits that were applied last have brought: what could come next, and what could be undone. So the next frame knows.

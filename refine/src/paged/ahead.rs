@@ -9,8 +9,10 @@ use super::shelf::{OnWay, read_page};
 use crate::format::{ByteRanges, MeshHead};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Pages that may stand beside the shelf, at most: a first frame keeps as many under way, later ones need one in several frames.
-const MOST: usize = 8;
+/// Pages that may stand beside the shelf, at most: some of those that are foreseen are needed late, or never.
+const MOST: usize = 24;
+/// Pages that are made at once, at most: what that takes on the way is much more than a page.
+const AT_ONCE: usize = 4;
 /// The part of the limit that they may take.
 const PART: usize = 8;
 /// Frames after which a page that was not asked for gives way.
@@ -70,14 +72,18 @@ impl Job {
         }
     }
 
-    /// It is not wanted any more; false while somebody is at it.
-    fn give_up(&self) -> bool {
+    /// It is not wanted any more, even if it was `made`; false while somebody is at it.
+    fn give_up(&self, made: bool) -> bool {
         let mut state = self.lock();
-        let running = matches!(*state, State::Running);
-        if !running {
+        let kept = match *state {
+            State::Running => true,
+            State::Done(_) => !made,
+            State::Waiting | State::Over => false,
+        };
+        if !kept {
             *state = State::Over;
         }
-        !running
+        !kept
     }
 }
 
@@ -95,9 +101,57 @@ impl Drop for End<'_> {
     }
 }
 
+/// A job that nobody has begun with.
+struct Waiting {
+    job: Arc<Job>,
+    head: Arc<MeshHead>,
+    way: OnWay,
+    /// It is needed in this frame, not only foreseen.
+    now: bool,
+}
+
+/// What waits for a thread.
+struct Line {
+    source: Shared,
+    waiting: Mutex<(Vec<Waiting>, usize)>,
+    /// So many are made at once.
+    at_once: usize,
+}
+
+impl Line {
+    /// What waits, and how many are being made.
+    fn lock(&self) -> MutexGuard<'_, (Vec<Waiting>, usize)> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Has one more made, if any waits and not as many as may be are under way.
+    fn go_on(self: &Arc<Line>) {
+        let mut line = self.lock();
+        let (waiting, under_way) = &mut *line;
+        if *under_way >= self.at_once || waiting.is_empty() {
+            return;
+        }
+        let next = waiting.remove(waiting.iter().position(|w| w.now).unwrap_or(0));
+        *under_way += 1;
+        drop(line);
+        let place = Place(self.clone());
+        begin(move || next.job.run(&*place.0.source, &next.head, &next.way));
+    }
+}
+
+/// A place among those that are made at once; however a job ends, the next takes it.
+struct Place(Arc<Line>);
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        self.0.lock().1 -= 1;
+        self.0.go_on();
+    }
+}
+
 /// What is made ahead.
 pub(super) struct Ahead {
-    source: Option<Shared>,
+    line: Option<Arc<Line>>,
     /// By chunk, and the frame in which each was wished for.
     jobs: Vec<(usize, u64, Arc<Job>)>,
     /// Pages that there is room for.
@@ -106,18 +160,33 @@ pub(super) struct Ahead {
     room: usize,
 }
 
+impl Drop for Ahead {
+    fn drop(&mut self) {
+        self.line.iter().for_each(|line| line.lock().0.clear());
+    }
+}
+
 impl std::fmt::Debug for Ahead {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Ahead({} of {})", self.jobs.len(), self.most)
     }
 }
 
+/// With so much room, how many pages may stand beside the shelf, and how many of them be made at once: several of the former for each of the latter, as some wait long.
+fn shares(room: usize, page: usize, way: usize) -> (usize, usize) {
+    let pages = |at_once: usize| room.saturating_sub(at_once * way) / page.max(1);
+    let at_once = (1..=AT_ONCE).rev().find(|&n| n == 1 || pages(n) >= 3 * n).unwrap_or(1);
+    (pages(at_once).min(MOST), at_once)
+}
+
 impl Ahead {
-    /// With so many bytes free; a page takes `page` at most, and `way` while it is made. All may be made at once, by as many threads.
+    /// With so many bytes free; a page takes `page` at most, and `way` while it is made.
     pub(super) fn new(source: Option<Shared>, free: usize, page: usize, way: usize) -> Ahead {
-        let each = page + way;
-        let most = if source.is_some() { (free / PART / each.max(1)).min(MOST) } else { 0 };
-        Ahead { source, jobs: Vec::new(), most, room: most * each }
+        let (most, at_once) = shares(free / PART, page, way);
+        let line = source.filter(|_| most > 0);
+        let (most, room) = if line.is_some() { (most, most * page + at_once * way) } else { (0, 0) };
+        let line = line.map(|source| Arc::new(Line { source, waiting: Mutex::default(), at_once }));
+        Ahead { line, jobs: Vec::new(), most, room }
     }
 
     /// Bytes set aside.
@@ -136,28 +205,49 @@ impl Ahead {
         false
     }
 
-    /// Has the page of a chunk, which is not on the shelf, made by somebody, if there is room; says whether it is, or will be.
-    pub(super) fn wish(&mut self, chunk: usize, frame: u64, head: &Arc<MeshHead>, way: OnWay) -> bool {
+    /// Has the page of a chunk, which is not on the shelf, made by somebody, if there is room, soon if it is needed `now`; says whether it is, or will be.
+    pub(super) fn wish(
+        &mut self,
+        chunk: usize,
+        (frame, now): (u64, bool),
+        head: &Arc<MeshHead>,
+        way: OnWay,
+    ) -> bool {
+        let Some(line) = &self.line else { return false };
         if let Some(job) = self.jobs.iter_mut().find(|j| j.0 == chunk) {
             job.1 = frame;
+            if now && let Some(w) = line.lock().0.iter_mut().find(|w| Arc::ptr_eq(&w.job, &job.2)) {
+                w.now = true;
+            }
             return true;
         }
         if self.jobs.len() >= self.most {
-            let old = self.jobs.iter().position(|j| j.1 + STALE < frame && j.2.give_up());
+            // What is needed goes before what was foreseen and nobody has begun with.
+            let stale = |j: &(usize, u64, Arc<Job>)| j.1 + STALE < frame && j.2.give_up(true);
+            let foreseen = |j: &(usize, u64, Arc<Job>)| now && j.1 < frame && j.2.give_up(false);
+            let old = self.jobs.iter().position(stale).or_else(|| self.jobs.iter().position(foreseen));
             let Some(old) = old else { return false };
-            self.jobs.swap_remove(old);
+            let (_, _, job) = self.jobs.swap_remove(old);
+            line.lock().0.retain(|w| !Arc::ptr_eq(&w.job, &job));
         }
-        let Some(source) = self.source.clone() else { return false };
-        let (head, job) = (head.clone(), Arc::new(Job::default()));
+        let job = Arc::new(Job::default());
         self.jobs.push((chunk, frame, job.clone()));
-        begin(move || job.run(&*source, &head, &way));
+        line.lock().0.push(Waiting { job, head: head.clone(), way, now });
+        line.go_on();
         true
     }
 
     /// The page of a chunk, if it was made ahead.
     pub(super) fn take(&mut self, chunk: usize) -> Option<Made> {
         let at = self.jobs.iter().position(|j| j.0 == chunk)?;
-        self.jobs.swap_remove(at).2.take()
+        let (_, _, job) = self.jobs.swap_remove(at);
+        let made = job.take();
+        if made.is_none()
+            && let Some(line) = &self.line
+        {
+            line.lock().0.retain(|w| !Arc::ptr_eq(&w.job, &job));
+        }
+        made
     }
 }
 

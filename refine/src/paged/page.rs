@@ -1,10 +1,12 @@
 //! Chunks of splits as they are held, and the base.
 
+use super::sight::{self, Sight};
 use crate::aif::{NONE, Positions};
 use crate::format::pages::{self, BaseLinks, Links, Lists};
 use crate::format::{MeshHead, SplitBlock};
 use crate::hierarchy::{Packed, SplitRows};
 use crate::progressive::{ProgressiveMesh, SplitCode, SplitKind};
+use crate::selective::Entry;
 use glam::{DVec3, Vec3};
 
 /// Where a row of attributes is: the page, or [`NONE`] for the base, and its number there.
@@ -87,6 +89,9 @@ pub(super) struct Page {
     moved_positions: Positions,
     /// Moved vertices before every 64th split.
     moved_before: Vec<u32>,
+    /// Some of the splits of later chunks that replace nodes made here, ascending, by which pages are known some frames before they are needed, and what they lead to.
+    pub(super) known: Vec<Entry>,
+    pub(super) sights: Vec<Sight>,
     /// By the ring rule what splits depend on beside what makes their vertex and their cuts, and their turns.
     pub(super) further: Lists,
     pub(super) rows: Vec<f32>,
@@ -113,7 +118,13 @@ pub(super) struct Page {
 
 impl Page {
     /// `None`: damage.
-    pub(super) fn new(head: &MeshHead, block: SplitBlock, own: Vec<Packed>, links: Links) -> Option<Page> {
+    pub(super) fn new(
+        head: &MeshHead,
+        origin: DVec3,
+        block: SplitBlock,
+        own: Vec<Packed>,
+        links: Links,
+    ) -> Option<Page> {
         let (count, faces) = (block.splits.len(), block.faces());
         let n0 = head.base_vertices;
         let mut face = block.first_face;
@@ -179,6 +190,12 @@ impl Page {
         if turns.len() == count && !(0..count).all(in_turn) {
             return None;
         }
+        let place = |k: usize| (block.new_positions.get(k) - origin).as_vec3();
+        let vertex = |k: usize| {
+            let maker = block.splits.vertex[k].checked_sub(n0)?.checked_sub(block.first)?;
+            Some(maker as usize)
+        };
+        let known = sight::known(block.first, (&own, &links), place, vertex);
         // Of a later chunk's it says itself; what it does not say is none.
         let bounds_of = |next: u32| match next.checked_sub(block.first).and_then(|k| own.get(k as usize)) {
             _ if next == NONE => Some(Packed::default()),
@@ -224,6 +241,8 @@ impl Page {
             },
             moved_positions: fit(block.moved_positions),
             moved_before,
+            known,
+            sights: Vec::new(),
             further: links.further,
             rows: shrink(block.rows),
             present: shrink(block.present),
@@ -306,6 +325,8 @@ impl Page {
             + of(&self.places)
             + points(&self.moved_positions)
             + of(&self.moved_before)
+            + of(&self.known)
+            + of(&self.sights)
             + of(&self.further.starts)
             + of(&self.further.on)
             + of(&self.further.turns)
@@ -330,7 +351,7 @@ impl Page {
         let attributes = 12 * count * (wedges > 0) as u64 + 12 * wedges + others;
         let places = if point > 12 { point * count } else { 0 };
         let records = (size_of::<Record>() as u64 + 4) * count + count.div_ceil(64) * (4 + 8 + 8);
-        let all = outside + others + attributes + places + records;
+        let all = outside + sight::most_bytes(count) + others + attributes + places + records;
         usize::try_from(all).unwrap_or(usize::MAX / 4) + size_of::<Page>() + 64
     }
 }

@@ -11,6 +11,7 @@ use crate::format::{
 };
 use crate::hierarchy::{Guarantee, Packed};
 use crate::progressive::{Damage, Fans, link_faces};
+use crate::selective::Entry;
 use glam::{DVec3, Vec3};
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -82,13 +83,15 @@ pub(super) struct OnWay {
     room: Room,
     /// Its bounds are for the ring rule.
     settled: bool,
+    /// Bounds are about it.
+    origin: DVec3,
 }
 
 /// Fetches and decodes a page.
 ///
 /// Errors: damage, which too little room cannot be told from; the source's.
 pub(super) fn read_page(source: &(impl ByteRanges + ?Sized), head: &MeshHead, way: &OnWay) -> Made {
-    let OnWay { chunk, bounds, beside, room, settled } = way;
+    let OnWay { chunk, bounds, beside, room, settled, origin } = way;
     // One range: they stand side by side.
     let bytes = source.fetch(chunk.offset..beside.range().end).map_err(FormatError::from)?;
     let part = |c: &Chunk| {
@@ -114,7 +117,7 @@ pub(super) fn read_page(source: &(impl ByteRanges + ?Sized), head: &MeshHead, wa
     if head.channels.is_some() && block.first_wedge != beside.first_face {
         return Err(damaged(beside).into());
     }
-    let page = Page::new(head, *block, own.of, links).ok_or_else(|| damaged(chunk))?;
+    let page = Page::new(head, *origin, *block, own.of, links).ok_or_else(|| damaged(chunk))?;
     Ok((page, bytes.len() as u64))
 }
 
@@ -130,6 +133,9 @@ pub(super) struct AtHand {
     /// All of what it depends on has a record, and all are named.
     pub(super) whole: bool,
 }
+
+/// Pages that are foreseen in a frame, at most.
+const FORESEEN: usize = 64;
 
 /// Splits between two entries of the index.
 const STRIDE: usize = 1024;
@@ -310,14 +316,33 @@ impl<S: ByteRanges> Shelf<S> {
         self.pages.get(self.chunk_of(i)).is_none_or(|p| p.is_none())
     }
 
-    /// Has the page of split `i` made ahead if it is not there and there is room for it; says whether it is there, or will be.
-    pub(super) fn wish(&mut self, i: u32) -> bool {
+    /// Has the page of split `i` made ahead if it is not there and there is room for it, soon if it is needed `now`; says whether it is there, or will be.
+    pub(super) fn wish(&mut self, i: u32, now: bool) -> bool {
         let c = self.chunk_of(i);
         if self.pages.get(c).is_none_or(|p| p.is_some()) {
             return true;
         }
         let Ok(way) = self.way(i, false) else { return false };
-        self.ahead.wish(c, self.frame, &self.head, way)
+        self.ahead.wish(c, (self.frame, now), &self.head, way)
+    }
+
+    /// Has pages made ahead that hold what is wanted some frames on, as far as pages that are there tell.
+    pub(super) fn foresee(&mut self, wants: impl Fn(&Entry) -> bool) {
+        let (mut seen, mut n) = ([0; FORESEEN], 0);
+        for page in self.all() {
+            let missing = |c: usize| self.pages.get(c).is_some_and(|p| p.is_none());
+            page.in_sight(missing, &wants, |c| {
+                if n < seen.len() && !seen[..n].contains(&c) {
+                    seen[n] = c;
+                    n += 1;
+                }
+            });
+        }
+        for &c in &seen[..n] {
+            if let Some(&first) = self.firsts.get(c) {
+                self.wish(first, false);
+            }
+        }
     }
 
     pub(super) fn directory_bytes(&self) -> u64 {
@@ -525,7 +550,8 @@ impl<S: ByteRanges> Shelf<S> {
     fn way(&self, i: u32, all: bool) -> Result<OnWay, PagedError> {
         let [chunk, bounds, beside] = self.entries(i)?;
         let room = if all { Room::ANY } else { Room::usual(chunk.count) };
-        Ok(OnWay { chunk, bounds, beside, room, settled: self.by_rings() })
+        let origin = self.base.links.origin;
+        Ok(OnWay { chunk, bounds, beside, room, settled: self.by_rings(), origin })
     }
 
     /// Fetches and decodes the page of split `i`, taking on the way as much as [`Shelf::most_at_once`] says; `all`: whatever it takes ([`Shelf::most_beyond`]). Pages that were made ahead are taken as they are.
@@ -543,6 +569,7 @@ impl<S: ByteRanges> Shelf<S> {
         }
         let (mut page, bytes) = made?;
         page.stamp = self.clock;
+        page.look_out(&self.firsts);
         self.held += page.bytes();
         self.resident += 1;
         self.traffic.chunks_decoded += 1;

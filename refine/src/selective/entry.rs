@@ -49,6 +49,18 @@ impl Entry {
         self.centre
     }
 
+    /// How far it reaches, and its error.
+    #[inline]
+    pub(crate) fn size(&self) -> (f64, f64) {
+        (f64::from(self.radius), f64::from(self.error))
+    }
+
+    /// At another place, and with a radius that is more by `wider`.
+    #[inline]
+    pub(crate) fn moved(self, centre: Vec3, wider: f32) -> Entry {
+        Entry { centre, radius: self.radius + wider, ..self }
+    }
+
     #[inline]
     fn with_direction(mut self, h: &Hierarchy) -> Entry {
         self.direction = h.direction(self.split);

@@ -23,8 +23,8 @@ pub(crate) struct Clocks {
     apart: bool,
     /// What the last frame has added to both.
     step: [f64; 2],
-    /// The lens some frames on, if it goes on so.
-    coming: Option<Lens>,
+    /// The lens some frames on, if it goes on so: as many as are looked at ahead, and fewer, for what is passed by in the meantime.
+    coming: Option<[Lens; 2]>,
 }
 
 /// When to look at something again.
@@ -39,6 +39,8 @@ pub(crate) struct Due {
 const ROUNDED: f64 = 1e-6;
 /// Frames that what will be needed is looked at ahead.
 const AHEAD_OF: f64 = 8.0;
+/// Fewer: what is near is passed by sooner.
+const PASSING: f64 = 3.0;
 /// The largest sums: radians, and diagonals.
 const MOST: f64 = 4.0;
 
@@ -67,7 +69,9 @@ impl Clocks {
         let apart = matches!(judges.lenses, [l] if l.perspective);
         let motion = self.motion(judges, apart);
         self.coming = match (&self.all.lenses[..], judges.lenses) {
-            ([before], [lens]) if motion.is_some() => Some(lens.going_on(before, AHEAD_OF)),
+            ([before], [lens]) if motion.is_some() => {
+                Some([AHEAD_OF, PASSING].map(|frames| lens.going_on(before, frames)))
+            }
             _ => None,
         };
         let stands = self.all.go_on(judges);
@@ -156,9 +160,9 @@ impl Clocks {
         (Due { until: early as f32, ..due }, soon)
     }
 
-    /// A split would be needed [`AHEAD_OF`] frames on, if the lens went on so.
-    pub(crate) fn will_want(&self, judges: &Judges<'_>, e: &Entry) -> bool {
-        self.coming.as_ref().is_some_and(|l| l.wants(e, l.tau) && judges.lenses.len() == 1)
+    /// A split would be needed [`AHEAD_OF`] or [`PASSING`] frames on, if the lens went on so.
+    pub(crate) fn will_want(&self, e: &Entry) -> bool {
+        self.coming.as_ref().is_some_and(|coming| coming.iter().any(|l| l.wants(e, l.tau)))
     }
 
     /// When something that has this slack is to be looked at again.
