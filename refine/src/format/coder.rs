@@ -266,6 +266,22 @@ impl<'a> Decoder<'a> {
         word
     }
 
+    /// Brings the state back above [`LEAST`], without a branch, which would mostly be foretold wrongly.
+    #[inline(always)]
+    fn fill(&mut self, state: u32) {
+        let low = state < LEAST;
+        let word = match self.bytes.get(self.at..self.at + 2) {
+            Some(b) => u16::from_le_bytes([b[0], b[1]]) as u32,
+            None => {
+                self.short |= low;
+                0
+            }
+        };
+        self.at += 2 * low as usize;
+        let filled = state << 16 | word;
+        self.state = std::hint::select_unpredictable(low, filled, state);
+    }
+
     /// The 8 bytes with the next plain bit, or what is left of them, and zeros.
     #[cold]
     fn tail(&self) -> u64 {
@@ -277,10 +293,7 @@ impl<'a> Decoder<'a> {
     /// Takes a decision's share out of the state.
     #[inline(always)]
     fn take(&mut self, (start, size): (u32, u32)) {
-        self.state = size * (self.state >> PRECISION) + (self.state & (TOTAL - 1)) - start;
-        if self.state < LEAST {
-            self.state = self.state << 16 | self.word();
-        }
+        self.fill(size * (self.state >> PRECISION) + (self.state & (TOTAL - 1)) - start);
     }
 }
 
@@ -294,10 +307,7 @@ impl Coder for Decoder<'_> {
         let bit = slot >= zero;
         // As `take` does, with one product for both.
         let below = (self.state >> PRECISION) * zero;
-        self.state = if bit { self.state - below - zero } else { below + slot };
-        if self.state < LEAST {
-            self.state = self.state << 16 | self.word();
-        }
+        self.fill(if bit { self.state - below - zero } else { below + slot });
         p.learn(bit);
         bit
     }
