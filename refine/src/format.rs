@@ -31,6 +31,7 @@ mod walk;
 mod write;
 
 pub use assembly::{Assembly, Decoded, Report, StreamSizes};
+pub(crate) use base::Gaps;
 pub use base::MeshHead;
 pub(crate) use codec::Room;
 pub use container::{Chunk, ChunkType, Directory, FormatError, MAGIC, VERSION};

@@ -6,6 +6,7 @@ use super::places::{self, Lattice, MAX_LATTICES, Places};
 use super::rows::Rows;
 use crate::aif::{Channel, Encoding, NONE, Semantic};
 use crate::progressive::{ProgressiveMesh, WedgeStreams};
+use std::ops::Range;
 
 /// What is true of a whole mesh; needed to read any chunk of it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -77,6 +78,16 @@ impl<'a> Singles<'a> {
     }
 }
 
+/// Faces between two splits that make one only, and how many such splits are before: those asked for last.
+#[derive(Debug)]
+pub(crate) struct Gaps([(Range<u32>, u32); 2]);
+
+impl Default for Gaps {
+    fn default() -> Self {
+        Gaps([(0..0, 0), (0..0, 0)])
+    }
+}
+
 impl MeshHead {
     /// The first face that split `i` makes. O(log n).
     pub fn first_face(&self, i: u32) -> u32 {
@@ -99,6 +110,27 @@ impl MeshHead {
             if 2 * self.single[mid] - (mid as u32) < k { low = mid + 1 } else { high = mid }
         }
         let k = k + low as u32;
+        Some((k / 2, k % 2 == 1))
+    }
+
+    /// As [`MeshHead::maker`], without searching where the last faces that were asked for were near: `gaps` remembers them.
+    pub(crate) fn maker_near(&self, f: u32, gaps: &mut Gaps) -> Option<(u32, bool)> {
+        let k = f.checked_sub(self.base_faces)?;
+        let (faces, singles) = match gaps.0.iter().find(|g| g.0.contains(&k)) {
+            Some(gap) => gap,
+            None => {
+                let end = |n: usize| self.single.get(n).map(|&i| 2 * i - n as u32);
+                let n = self.maker(f).map_or(0, |(i, second)| 2 * i + u32::from(second) - k);
+                let before = (n as usize).checked_sub(1).and_then(end);
+                let from = before.map_or(0, |e| e + 1);
+                let to = end(n as usize).map_or(u32::MAX, |e| e + 1);
+                gaps.0.swap(0, 1);
+                gaps.0[0] = (from..to, n);
+                &gaps.0[0]
+            }
+        };
+        debug_assert!(faces.contains(&k));
+        let k = k + singles;
         Some((k / 2, k % 2 == 1))
     }
 
@@ -415,4 +447,37 @@ pub(super) fn read(bytes: &[u8], raw: u64) -> Option<(MeshHead, ProgressiveMesh)
     code_base(&mut d, &head, &mut pm)?;
     head.start = Start::new(&pm)?;
     Some((head, pm)).filter(|_| !d.spent())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn makers_are_the_same_without_searching(
+            (splits, base_faces) in (1u32..400, 0u32..20),
+            single in prop::collection::vec(any::<prop::sample::Index>(), 0..60),
+            faces in prop::collection::vec((any::<prop::sample::Index>(), 0u32..6), 1..80),
+        ) {
+            let mut single: Vec<u32> = single.iter().map(|i| i.index(splits as usize) as u32).collect();
+            single.sort_unstable();
+            single.dedup();
+            let head = MeshHead { splits, base_faces, single, ..MeshHead::default() };
+            // Who makes each face, one split after the other.
+            let makers: Vec<(u32, bool)> = (0..splits)
+                .flat_map(|i| [(i, false), (i, true)].into_iter().take(2 - usize::from(head.is_single(i))))
+                .collect();
+            let all = base_faces + makers.len() as u32;
+            let mut gaps = Gaps::default();
+            for (at, run) in faces {
+                for f in (at.index(all as usize) as u32..all).take(run as usize + 1) {
+                    let want = f.checked_sub(base_faces).map(|k| makers[k as usize]);
+                    prop_assert_eq!(head.maker_near(f, &mut gaps), want);
+                    prop_assert_eq!(head.maker(f), want);
+                }
+            }
+        }
+    }
 }

@@ -185,7 +185,8 @@ fn code<C: Coder>(
     let mut links =
         Links { parent: Vec::with_capacity(count), next: vec![[NONE; 2]; count], ..Links::default() };
     // The node that each vertex is at, once a split of the chunk has split it; and of vertices made here.
-    let mut roots: FxHashMap<u32, u32> = FxHashMap::default();
+    let mut roots: FxHashMap<u32, u32> =
+        FxHashMap::with_capacity_and_hasher(count / 2, rustc_hash::FxBuildHasher);
     let mut made: Vec<u32> = Vec::with_capacity(count);
     for (i, &v) in (first..end).zip(vertices) {
         let here = v.checked_sub(n0).and_then(|j| j.checked_sub(first)).map(|k| k as usize);

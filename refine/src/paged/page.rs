@@ -3,7 +3,7 @@
 use super::sight::{self, Sight};
 use crate::aif::{NONE, Positions};
 use crate::format::pages::{self, BaseLinks, Links, Lists};
-use crate::format::{MeshHead, SplitBlock};
+use crate::format::{Gaps, MeshHead, SplitBlock};
 use crate::hierarchy::{Packed, SplitRows};
 use crate::progressive::{ProgressiveMesh, SplitCode, SplitKind};
 use crate::selective::Entry;
@@ -168,7 +168,8 @@ impl Page {
         if [links.parent.len(), links.next.len(), own.len()] != [count; 3] {
             return None;
         }
-        let by_maker = |cut: u32| match head.maker(cut >> 2) {
+        let mut gaps = Gaps::default();
+        let mut by_maker = |cut: u32| match head.maker_near(cut >> 2, &mut gaps) {
             Some((i, second)) if cut != NONE => (head.base_faces + 2 * i + second as u32) << 2 | cut & 3,
             _ => cut,
         };
