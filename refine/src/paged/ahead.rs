@@ -258,3 +258,116 @@ fn begin(work: impl FnOnce() + Send + 'static) {
 
 #[cfg(not(feature = "parallel"))]
 fn begin(_: impl FnOnce() + Send + 'static) {}
+
+#[cfg(all(test, feature = "parallel"))]
+mod tests {
+    use super::*;
+    use crate::format::{Chunk, ChunkType, Room};
+    use glam::DVec3;
+    use std::ops::Range;
+
+    /// A source that keeps everybody waiting until it is opened, and then has nothing.
+    #[derive(Default)]
+    struct Gate {
+        /// Where they wait, in the order in which they came; whether it is open; how many are inside, and have ever been.
+        state: Mutex<(Vec<u64>, bool, usize, usize)>,
+        changed: Condvar,
+    }
+
+    impl Gate {
+        fn wait_for(&self, until: impl Fn(&(Vec<u64>, bool, usize, usize)) -> bool) -> Vec<u64> {
+            let mut state = self.state.lock().unwrap();
+            while !until(&state) {
+                state = self.changed.wait(state).unwrap();
+            }
+            state.0.clone()
+        }
+
+        fn open(&self, open: bool) {
+            self.state.lock().unwrap().1 = open;
+            self.changed.notify_all();
+        }
+    }
+
+    impl ByteRanges for Gate {
+        fn fetch(&self, range: Range<u64>) -> std::io::Result<Vec<u8>> {
+            {
+                let mut state = self.state.lock().unwrap();
+                state.0.push(range.start);
+                state.2 += 1;
+                state.3 = state.3.max(state.2);
+            }
+            self.changed.notify_all();
+            self.wait_for(|s| s.1);
+            self.state.lock().unwrap().2 -= 1;
+            self.changed.notify_all();
+            Err(std::io::ErrorKind::NotFound.into())
+        }
+    }
+
+    fn way(offset: u64) -> OnWay {
+        let chunk = Chunk {
+            kind: ChunkType::SPLITS,
+            index: 0,
+            critical: true,
+            mesh: 0,
+            first: 0,
+            count: 0,
+            first_face: 0,
+            band: 0,
+            subtree: 0,
+            error: 0.0,
+            offset,
+            stored: 0,
+            raw: 0,
+            checksum: 0,
+        };
+        OnWay::new([chunk; 3], Room::ANY, false, DVec3::ZERO)
+    }
+
+    /// However many threads there are: no more pages are made at once, and stand by, than there is room for; what is needed goes first.
+    #[test]
+    fn as_many_are_made_as_there_is_room_for_and_the_needed_first() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3 * AT_ONCE).build().unwrap();
+        let gate = Arc::new(Gate::default());
+        let (page, each) = (10, 100);
+        let mut ahead = Ahead::new(Some(gate.clone()), PART * (AT_ONCE * each + 20 * page), page, each);
+        assert_eq!((ahead.most, ahead.bytes()), (20, AT_ONCE * each + 20 * page));
+        let head = Arc::new(MeshHead::default());
+        let wish = |ahead: &mut Ahead, c: usize, frame: u64, now: bool| {
+            pool.install(|| ahead.wish(c, (frame, now), &head, way(c as u64)))
+        };
+        for c in 0..20 {
+            assert!(wish(&mut ahead, c, 1, c == 15));
+        }
+        let first = gate.wait_for(|s| s.0.len() == AT_ONCE);
+        assert!(first.iter().all(|&c| c < AT_ONCE as u64));
+        // There is no room for more that is foreseen; for what is needed another gives way, which nobody has begun with and nobody asked for in this frame.
+        assert!(!wish(&mut ahead, 20, 2, false));
+        assert!(!wish(&mut ahead, 20, 1, true));
+        assert!(wish(&mut ahead, 20, 2, true));
+        assert!(ahead.jobs.iter().filter(|j| j.0 < AT_ONCE).count() == AT_ONCE && ahead.jobs.len() == 20);
+        gate.open(true);
+        let all = gate.wait_for(|s| s.0.len() == 20 && s.2 == 0);
+        // As each that ends lets the next begin, both that are needed come right behind those that had begun.
+        let needed = [15, 20].map(|c| all.iter().position(|&x| x == c).unwrap());
+        assert!(needed.iter().all(|&k| (AT_ONCE..2 * AT_ONCE + 2).contains(&k)), "{needed:?}");
+        assert_eq!(gate.state.lock().unwrap().3, AT_ONCE);
+        // All that were not given up were made, and are taken once.
+        let made: Vec<usize> = (0..21).filter(|&c| matches!(ahead.take(c), Some(Err(_)))).collect();
+        assert_eq!(made.len(), 20);
+        assert!(made.contains(&15) && made.contains(&20));
+        assert!((0..21).all(|c| ahead.take(c).is_none()));
+        assert!(ahead.line.as_ref().is_some_and(|l| l.lock().0.is_empty()));
+        // What is not begun when all ends is not made.
+        gate.open(false);
+        (30..40).for_each(|c| assert!(wish(&mut ahead, c, 3, false)));
+        gate.wait_for(|s| s.0.len() == 20 + AT_ONCE);
+        drop(ahead);
+        gate.open(true);
+        gate.wait_for(|s| s.2 == 0);
+        pool.install(|| ());
+        drop(pool);
+        assert_eq!(gate.state.lock().unwrap().0.len(), 20 + AT_ONCE);
+    }
+}

@@ -87,6 +87,18 @@ pub(super) struct OnWay {
     origin: DVec3,
 }
 
+impl OnWay {
+    /// Of a chunk of splits, its `BNDS` and its `PAGE`.
+    pub(super) fn new(
+        [chunk, bounds, beside]: [Chunk; 3],
+        room: Room,
+        settled: bool,
+        origin: DVec3,
+    ) -> OnWay {
+        OnWay { chunk, bounds, beside, room, settled, origin }
+    }
+}
+
 /// Fetches and decodes a page.
 ///
 /// Errors: damage, which too little room cannot be told from; the source's.
@@ -548,10 +560,9 @@ impl<S: ByteRanges> Shelf<S> {
 
     /// What the page of split `i` is made of.
     fn way(&self, i: u32, all: bool) -> Result<OnWay, PagedError> {
-        let [chunk, bounds, beside] = self.entries(i)?;
-        let room = if all { Room::ANY } else { Room::usual(chunk.count) };
-        let origin = self.base.links.origin;
-        Ok(OnWay { chunk, bounds, beside, room, settled: self.by_rings(), origin })
+        let entries = self.entries(i)?;
+        let room = if all { Room::ANY } else { Room::usual(entries[0].count) };
+        Ok(OnWay::new(entries, room, self.by_rings(), self.base.links.origin))
     }
 
     /// Fetches and decodes the page of split `i`, taking on the way as much as [`Shelf::most_at_once`] says; `all`: whatever it takes ([`Shelf::most_beyond`]). Pages that were made ahead are taken as they are.
