@@ -66,7 +66,7 @@ impl<S: ByteRanges> PagedView<S> {
         if self.motions.is_some() {
             let mut needs = std::mem::take(&mut self.needed);
             self.shelf.needs_of_hot(h, &mut needs)?;
-            self.can_count(i, &needs, APPLIED | LED, |r| r.holders)?;
+            self.can_count(i, &needs, APPLIED, |r| r.holders)?;
             split(self, &s, cuts, &explicit)?;
             for &d in &needs {
                 self.shelf.pool.get_mut(d).into_iter().for_each(|d| d.holders += 1);

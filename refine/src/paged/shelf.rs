@@ -410,10 +410,9 @@ impl<S: ByteRanges> Shelf<S> {
         self.chunks.len()
     }
 
-    /// The first split of a chunk, and how many it has if its page is there; else none.
-    pub(super) fn resident_run(&self, chunk: usize) -> (u32, u32) {
-        let page = self.pages.get(chunk).and_then(|p| p.as_deref());
-        page.map_or((0, 0), |p| (p.first, p.of.len() as u32))
+    /// The page of a chunk, if it is there.
+    pub(super) fn page_of_chunk(&self, chunk: usize) -> Option<&Page> {
+        self.pages.get(chunk).and_then(|p| p.as_deref())
     }
 
     /// The flags of split `i`; none of one that is neither asked for nor drawn.
@@ -742,7 +741,10 @@ impl<S: ByteRanges> Shelf<S> {
     pub(super) fn node_of(&self, v: u32, maker: u32) -> u32 {
         match self.base.node.get(v as usize) {
             Some(&node) => node,
-            None => self.pool.get(maker).map_or(NONE, |h| h.node),
+            None => {
+                let is_maker = |h: &&Hot| self.head.base_vertices + h.split == v;
+                self.pool.get(maker).filter(is_maker).map_or(NONE, |h| h.node)
+            }
         }
     }
 
@@ -751,7 +753,11 @@ impl<S: ByteRanges> Shelf<S> {
     pub(super) fn set_node_of(&mut self, v: u32, maker: u32, node: u32) {
         match self.base.node.get_mut(v as usize) {
             Some(at) => *at = node,
-            None => self.pool.get_mut(maker).into_iter().for_each(|h| h.node = node),
+            None => {
+                let n0 = self.head.base_vertices;
+                let of_maker = self.pool.get_mut(maker).filter(|h| n0 + h.split == v);
+                of_maker.into_iter().for_each(|h| h.node = node);
+            }
         }
     }
 

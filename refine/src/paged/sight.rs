@@ -1,7 +1,7 @@
 //! What tells that the pages below a page will be needed: some of the splits that lead to them, with their bounds.
 //!
 //! A split that comes next at a vertex shown is looked at some frames ahead where its page is not there. But what comes next at a vertex that is not shown yet can be needed in the very frame in which that is: on a fast
-//! flight over rough terrain a quarter of all pages come in so. Bounds hold those of the splits below, so that such a split will be needed is known without what stands above it.
+//! flight over rough terrain a good part of all pages come in so. Bounds hold those of the splits below, so that such a split will be needed is known without what stands above it.
 
 use super::page::Page;
 use crate::aif::NONE;

@@ -73,23 +73,17 @@ impl<S: ByteRanges> PagedView<S> {
         let mut done = Followed::default();
         let Some(motions) = &mut self.motions else { return Ok(done) };
         motions.clear();
-        // Page by page: without lists.
+        // Page by page: of a page there is a list.
         for c in 0..self.shelf.chunk_count() {
-            let (first, count) = self.shelf.resident_run(c);
-            for i in first..first + count {
-                if self.shelf.flags(i) & (APPLIED | LED) == LED {
-                    self.draw(i)?;
-                    done.splits += 1;
-                }
+            for i in self.shelf.splits_of(c, |f| f & (APPLIED | LED) == LED) {
+                self.draw(i)?;
+                done.splits += 1;
             }
         }
         for c in (0..self.shelf.chunk_count()).rev() {
-            let (first, count) = self.shelf.resident_run(c);
-            for i in (first..first + count).rev() {
-                if self.shelf.flags(i) & (APPLIED | LED) == APPLIED {
-                    self.undraw(i)?;
-                    done.collapses += 1;
-                }
+            for i in self.shelf.splits_of(c, |f| f & (APPLIED | LED) == APPLIED).into_iter().rev() {
+                self.undraw(i)?;
+                done.collapses += 1;
             }
         }
         self.stepped();
@@ -147,14 +141,31 @@ impl<S> Shelf<S> {
     {
         let mut out = Vec::new();
         for p in self.all().filter(|p| pages(p)) {
-            let from = out.len();
-            let flags = |h: u32| self.pool.get(h).map_or(0, |r| r.flags);
-            out.extend((p.first..).zip(&p.hot).filter(|(_, h)| of(flags(**h))).map(|(i, _)| i));
-            if self.by_rings() {
-                out[from..].sort_unstable_by_key(|&i| self.order_key(i));
-            }
+            self.add_splits_of(p, &of, &mut out);
         }
         out
+    }
+
+    /// Those of one page, if it is there.
+    fn splits_of(&self, chunk: usize, of: impl Fn(u8) -> bool) -> Vec<u32>
+    where
+        S: ByteRanges,
+    {
+        let mut out = Vec::new();
+        self.page_of_chunk(chunk).into_iter().for_each(|p| self.add_splits_of(p, &of, &mut out));
+        out
+    }
+
+    fn add_splits_of(&self, p: &Page, of: &impl Fn(u8) -> bool, out: &mut Vec<u32>)
+    where
+        S: ByteRanges,
+    {
+        let from = out.len();
+        let flags = |h: u32| self.pool.get(h).map_or(0, |r| r.flags);
+        out.extend((p.first..).zip(&p.hot).filter(|(_, h)| of(flags(**h))).map(|(i, _)| i));
+        if self.by_rings() {
+            out[from..].sort_unstable_by_key(|&i| self.order_key(i));
+        }
     }
 }
 

@@ -181,7 +181,7 @@ impl Clocks {
         let until = self.moved + away * self.turned + slack * SAFE;
         let until = (until - ROUNDED * until) as f32;
         // NaN is now.
-        if until.is_nan() { Due::NOW } else { Due { away: away as f32, until } }
+        if until.is_nan() { Due::NOW } else { Due { away: away as f32, until: until.min(f32::MAX) } }
     }
 }
 
