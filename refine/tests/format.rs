@@ -637,6 +637,20 @@ fn every_file_of_the_corpus_and_every_truncation_is_survived() {
     assert!(files >= 3 && whole >= 3, "{files} files, {whole} whole");
 }
 
+#[test]
+fn files_of_other_versions_are_told() {
+    let pm = build(sample("scan", 200, 1), &options(Method::Quadric, None), &Quiet).unwrap().mesh;
+    let bytes = encode(&[pm], &[], &[], &EncodeOptions::default()).unwrap();
+    let with = |major: u16| {
+        let mut other = bytes.clone();
+        other[8..10].copy_from_slice(&major.to_le_bytes());
+        decode(&other).unwrap_err().to_string()
+    };
+    let [old, new] = [with(4), with(999)];
+    assert!(old.contains("version 4") && old.contains("encode the mesh again"), "{old}");
+    assert!(new.contains("version 999") && !new.contains("again"), "{new}");
+}
+
 /// Seeds for [`every_file_of_the_corpus_and_every_truncation_is_survived`]: what the format can hold, in files as small as can be.
 #[test]
 #[ignore = "writes tests/corpus anew, when the format has changed: what fuzzing found there does not come back"]

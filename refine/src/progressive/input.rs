@@ -261,7 +261,7 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
         let faces = order.face_slots();
         let slot = |c: usize| self.indices()[faces[c / 3] as usize][c % 3];
         let mut out = vec![NONE; 3 * faces.len()];
-        let (mut of_slot, mut of_vertex) = (FxHashMap::default(), FxHashMap::default());
+        let (mut of_slot, mut of_vertex): (FxHashMap<u32, u32>, FxHashMap<u32, u32>) = Default::default();
         let (mut at, mut first) = (0, 0);
         for &size in &p.sizes {
             // A polygon of n corners was cut into n - 2 triangles, which follow each other. Of their corners n are named; the others are the same by
@@ -269,6 +269,10 @@ impl<P: Deref<Target = ProgressiveMesh>> Cursor<P> {
             let named = at..at + size as usize;
             let named = p.corners[named.clone()].iter().map(|&c| c as usize).zip(&wedges.corner[named]);
             let end = out.len().min(first + 3 * (size as usize).saturating_sub(2));
+            // Clearing takes as long as the largest polygon was.
+            if of_slot.capacity() > 64 + 8 * size as usize {
+                (of_slot, of_vertex) = Default::default();
+            }
             of_slot.clear();
             of_vertex.clear();
             for (c, &w) in named.clone() {

@@ -33,7 +33,7 @@ struct OnGrid {
     others: Positions,
 }
 
-/// Points looked at to find whether there is a grid.
+/// Points looked at to find whether there is a grid. With 2,000, which take longer, the files of a scene of an engine, of bunny with texture coordinates, of horse and of fandisk are the same.
 const SAMPLES: usize = 500;
 
 impl Default for Places {

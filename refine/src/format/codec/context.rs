@@ -200,7 +200,7 @@ impl<'a> Sources<'a> {
 
     /// All splits before `range` that those in it depend on.
     pub(in super::super) fn find(&mut self, range: std::ops::Range<usize>) {
-        self.is.fill(0);
+        self.ids.iter().for_each(|&i| self.is[(i / 64) as usize] = 0);
         self.ids.clear();
         self.faces.clear();
         self.first = range.start as u32;
@@ -223,7 +223,7 @@ impl<'a> Sources<'a> {
         }
         // Ascending.
         self.ids.clear();
-        for (&word, first) in self.is.iter().zip((0u32..).step_by(64)) {
+        for (&word, first) in self.is[..range.start.div_ceil(64)].iter().zip((0u32..).step_by(64)) {
             let mut word = word;
             while word != 0 {
                 self.ids.push(first + word.trailing_zeros());
@@ -240,13 +240,21 @@ impl<'a> Sources<'a> {
         self.faces.push(face);
     }
 
+    /// A split before the chunk is among those it depends on.
+    fn has(&self, i: u32) -> bool {
+        self.is[(i / 64) as usize] >> (i % 64) & 1 != 0
+    }
+
     /// The number of a vertex in the mesh of the chunk.
     #[inline]
     pub(in super::super) fn vertex(&self, v: u32) -> u32 {
         match v.checked_sub(self.head.base_vertices) {
             None => v,
             Some(i) if i >= self.first => v - self.first + self.ids.len() as u32,
-            Some(i) => self.head.base_vertices + self.slot[i as usize],
+            Some(i) => {
+                debug_assert!(self.has(i));
+                self.head.base_vertices + self.slot[i as usize]
+            }
         }
     }
 
@@ -262,6 +270,7 @@ impl<'a> Sources<'a> {
             self.faces.last().map_or(0, |&f| face - self.first_face + f)
         } else {
             let Some(&maker) = self.maker.get((face - self.head.base_faces) as usize) else { return cut };
+            debug_assert!(self.has(maker >> 1));
             self.faces[self.slot[(maker >> 1) as usize] as usize] + (maker & 1)
         };
         face << 2 | cut & 3
