@@ -6,7 +6,7 @@
 use crate::selective::{Clocks, Due, Entry, Sums};
 
 /// Frames to the horizon, at most.
-const FRAMES: f64 = 16.0;
+const FRAMES: f64 = 32.0;
 
 /// More bytes that an array of such a capacity takes with room for so many, and those of the old one while it is filled.
 pub(super) fn grown<T>(capacity: usize, to: usize) -> [usize; 2] {

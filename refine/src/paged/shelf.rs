@@ -146,6 +146,9 @@ pub(super) struct AtHand {
     pub(super) whole: bool,
 }
 
+/// Frames in which all pages are asked once: less than pages are foreseen by.
+const ASKED: u64 = 4;
+
 /// Pages that are foreseen in a frame, at most.
 const FORESEEN: usize = 64;
 
@@ -338,10 +341,11 @@ impl<S: ByteRanges> Shelf<S> {
         self.ahead.wish(c, (self.frame, now), &self.head, way)
     }
 
-    /// Has pages made ahead that hold what is wanted some frames on, as far as pages that are there tell.
+    /// Has pages made ahead that hold what is wanted some frames on, as far as pages that are there tell; a part of these is asked in each frame.
     pub(super) fn foresee(&mut self, wants: impl Fn(&Entry) -> bool) {
         let (mut seen, mut n) = ([0; FORESEEN], 0);
-        for page in self.all() {
+        let (all, from) = (self.pages.len(), (self.frame % ASKED) as usize);
+        for page in (from..all).step_by(ASKED as usize).filter_map(|c| self.page_of_chunk(c)) {
             let missing = |c: usize| self.pages.get(c).is_some_and(|p| p.is_none());
             page.in_sight(missing, &wants, |c| {
                 if n < seen.len() && !seen[..n].contains(&c) {
