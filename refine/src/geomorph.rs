@@ -195,7 +195,7 @@ impl Geomorph {
         &self.vertex_ancestors
     }
 
-    /// For every wedge of the finer mesh the one it comes from in the coarser; there may be a few more than splits make, where seams end.
+    /// For every wedge of the finer mesh the one it comes from in the coarser; there may be a few more than splits make: where seams end, and where full detail differs from what splits make in the sign of a zero or in a polygon.
     pub fn wedge_ancestors(&self) -> &[u32] {
         &self.wedge_ancestors
     }
