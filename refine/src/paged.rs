@@ -340,8 +340,8 @@ impl<S: ByteRanges> PagedView<S> {
                 grown::<u64>(self.touched.capacity(), slots.div_ceil(64)),
             ];
             let lists = [self.open.growth([places[0], open_there]), self.last.growth([places[1], there])];
-            let all = of_slots.iter().filter(|_| records > 0).chain(&lists);
-            let [more, most] = all.fold([0; 2], |sum, g| [sum[0] + g[0], sum[1].max(g[1])]);
+            let [more, most] =
+                of_slots.iter().chain(&lists).fold([0; 2], |sum, g| [sum[0] + g[0], sum[1].max(g[1])]);
             bytes += more + most;
         }
         let moving = if self.motions.is_some() && !self.at_once { CHANGE * splits } else { 0 };
@@ -358,12 +358,10 @@ impl<S: ByteRanges> PagedView<S> {
         fn grow<T>(v: &mut Vec<T>, to: usize) {
             v.reserve_exact(to.saturating_sub(v.len()));
         }
-        if records > 0 {
-            grow(&mut self.shelf.pool.of, records);
-            grow(&mut self.fans.corners, slots);
-            grow(&mut self.fans.links, slots);
-            grow(&mut self.touched, slots.div_ceil(64));
-        }
+        grow(&mut self.shelf.pool.of, records);
+        grow(&mut self.fans.corners, slots);
+        grow(&mut self.fans.links, slots);
+        grow(&mut self.touched, slots.div_ceil(64));
         self.open.reserve_to([places[0], open_there]);
         self.last.reserve_to([places[1], there]);
         true
