@@ -12,6 +12,7 @@
 
 mod near;
 
+pub(super) use near::Now;
 pub(crate) use near::{Clocks, Due, Looked, Sums};
 
 use super::Lens;
@@ -439,6 +440,21 @@ impl Many<'_> {
         match (&self.sieve, self.judges.lenses) {
             (Some(sieve), [lens]) => sieve.look((lens, self.part * lens.tau, &self.pace), entries, out),
             _ => out.extend(entries.iter().map(|e| Found::from(self.judges.of(e, self.part, &self.pace)))),
+        }
+    }
+
+    /// The same, and when to look again; `other` says it of what is found out one by one.
+    fn look_until(
+        &self,
+        now: Option<Now>,
+        entries: &[Entry],
+        other: impl Fn(&Entry, Verdict) -> (bool, Due),
+        out: &mut Vec<(bool, Due)>,
+    ) {
+        let one = |e: &Entry| other(e, self.judges.of(e, self.part, &self.pace));
+        match (&self.sieve, now) {
+            (Some(sieve), Some(now)) => sieve.look_until(&now, entries, one, out),
+            _ => out.extend(entries.iter().map(one)),
         }
     }
 

@@ -5,9 +5,9 @@
 //! decided about by [`Lens`] itself. So what is decided is the same, to the last split. Slacks are lower by the margins, so some splits are looked at a little earlier.
 
 use super::Lens;
-use super::clock::{Found, Pace};
+use super::clock::{Due, Found, Now, Pace};
 use super::entry::Entry;
-use glam::{Vec3, Vec4};
+use glam::{BVec4A, Mat4, Vec3, Vec4};
 
 /// Splits that go through at a time, in one instruction.
 const LANES: usize = 4;
@@ -41,11 +41,57 @@ pub(super) struct Sieve {
     far: [f32; 3],
 }
 
+/// Splits side by side: as many as go through at a time.
+struct Four {
+    centre: Vectors,
+    radius: Vec4,
+    error: Vec4,
+    cone: [u32; LANES],
+}
+
+impl Four {
+    /// Of at most [`LANES`]; where there are fewer the first stands for those that are not there.
+    #[inline(always)]
+    fn of(part: &[Entry]) -> Option<Four> {
+        let first = part.first()?;
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| part.get(k).unwrap_or(first));
+        let [p, q, r, s] = [a, b, c, d].map(|e| e.centre.extend(e.radius));
+        let of = Mat4::from_cols(p, q, r, s).transpose();
+        Some(Four {
+            centre: Vectors { x: of.x_axis, y: of.y_axis, z: of.z_axis },
+            radius: of.w_axis,
+            error: Vec4::new(a.error, b.error, c.error, d.error),
+            cone: [a, b, c, d].map(|e| e.cone.0),
+        })
+    }
+
+    /// What coordinates may be off by.
+    #[inline(always)]
+    fn margin(&self, base: f32) -> Vec4 {
+        let p = self.centre;
+        MARGIN * (p.x.abs() + p.y.abs() + p.z.abs() + self.radius + all(base))
+    }
+}
+
 /// What became of splits: needed or not, as far as that is sure, a bit each.
 struct Sieved {
     wanted: u32,
     unwanted: u32,
-    slack: [f32; LANES],
+    slack: Vec4,
+    /// How far from the eye, and by how much these numbers may be off.
+    away: Vec4,
+    margin: Vec4,
+}
+
+impl Sieved {
+    const NOTHING: Sieved =
+        Sieved { wanted: 0, unwanted: 0, slack: Vec4::ZERO, away: Vec4::ZERO, margin: Vec4::ZERO };
+
+    /// Whether the one in a lane is needed, if that is sure.
+    #[inline(always)]
+    fn sure(&self, k: usize) -> Option<bool> {
+        ((self.wanted | self.unwanted) >> k & 1 != 0).then_some(self.wanted >> k & 1 != 0)
+    }
 }
 
 /// Vectors side by side.
@@ -153,11 +199,31 @@ impl Sieve {
     ) {
         for part in entries.chunks(LANES) {
             let s = self.sift::<true>(part);
-            for (k, (e, slack)) in part.iter().zip(s.slack).enumerate() {
-                out.push(if (s.wanted | s.unwanted) >> k & 1 != 0 {
-                    Found { wanted: s.wanted >> k & 1 != 0, slack }
-                } else {
-                    lens.verdict(e, tau, pace).into()
+            for (k, (e, slack)) in part.iter().zip(s.slack.to_array()).enumerate() {
+                out.push(match s.sure(k) {
+                    Some(wanted) => Found { wanted, slack },
+                    None => lens.verdict(e, tau, pace).into(),
+                });
+            }
+        }
+    }
+
+    /// Whether each split is needed, and when that is to be looked at again; what is not sure is left to `other`.
+    pub(super) fn look_until(
+        &self,
+        now: &Now,
+        entries: &[Entry],
+        other: impl Fn(&Entry) -> (bool, Due),
+        out: &mut Vec<(bool, Due)>,
+    ) {
+        for part in entries.chunks(LANES) {
+            let s = self.sift::<true>(part);
+            let (away, until) = now.due(s.away, s.slack, s.margin);
+            let times = away.to_array().into_iter().zip(until.to_array());
+            for (k, (e, (away, until))) in part.iter().zip(times).enumerate() {
+                out.push(match s.sure(k) {
+                    Some(wanted) => (wanted, Due::new(away, until)),
+                    None => other(e),
                 });
             }
         }
@@ -167,28 +233,24 @@ impl Sieve {
     pub(super) fn wanted(&self, lens: &Lens, tau: f64, entries: &[Entry], out: &mut Vec<bool>) {
         for part in entries.chunks(LANES) {
             let s = self.sift::<false>(part);
-            for (k, e) in part.iter().enumerate() {
-                let sure = (s.wanted | s.unwanted) >> k & 1 != 0;
-                out.push(if sure { s.wanted >> k & 1 != 0 } else { lens.wants(e, tau) });
-            }
+            out.extend(part.iter().enumerate().map(|(k, e)| s.sure(k).unwrap_or_else(|| lens.wants(e, tau))));
+        }
+    }
+
+    #[inline(always)]
+    fn sift<const SLACK: bool>(&self, part: &[Entry]) -> Sieved {
+        match Four::of(part) {
+            None => Sieved::NOTHING,
+            Some(of) if self.back => self.decide::<SLACK, true>(&of),
+            Some(of) => self.decide::<SLACK, false>(&of),
         }
     }
 
     /// See [`Lens::verdict`] for what each number is. Of at most [`LANES`]; where there are fewer, what is said of the others means nothing.
     #[inline(always)]
-    fn sift<const SLACK: bool>(&self, part: &[Entry]) -> Sieved {
-        let Some(first) = part.first() else { return Sieved { wanted: 0, unwanted: 0, slack: [0.0; LANES] } };
-        let at = |k: usize| part.get(k).unwrap_or(first);
-        let [a, b, c, d] = [first, at(1), at(2), at(3)];
-        let p = Vectors {
-            x: Vec4::new(a.centre.x, b.centre.x, c.centre.x, d.centre.x),
-            y: Vec4::new(a.centre.y, b.centre.y, c.centre.y, d.centre.y),
-            z: Vec4::new(a.centre.z, b.centre.z, c.centre.z, d.centre.z),
-        };
-        let radius = Vec4::new(a.radius, b.radius, c.radius, d.radius);
-        let error = Vec4::new(a.error, b.error, c.error, d.error);
-        let code = [a.cone.0, b.cone.0, c.cone.0, d.cone.0];
-        let margin = MARGIN * (p.x.abs() + p.y.abs() + p.z.abs() + radius + all(self.base));
+    fn decide<const SLACK: bool, const BACK: bool>(&self, of: &Four) -> Sieved {
+        let &Four { centre: p, radius, error, cone: code } = of;
+        let margin = of.margin(self.base);
         // Fine enough from here?
         let d = Vectors { x: p.x - all(self.eye.x), y: p.y - all(self.eye.y), z: p.z - all(self.eye.z) };
         let away = d.length();
@@ -206,31 +268,37 @@ impl Sieve {
         let inside = sides.min(inside(near).min(inside(far))) + radius;
         let (is_in, is_out) = (inside.cmpgt(margin), inside.cmplt(-margin));
         // Turned away?
-        let part = |shift: u32, mask: u32| {
-            let of = |c: u32| (c >> shift & mask) as i32 as f32;
-            Vec4::new(of(code[0]), of(code[1]), of(code[2]), of(code[3]))
-        };
-        let (u, v) = (part(0, 0x3ff), part(10, 0x3ff));
-        let (u, v) = (u * (2.0 / 1023.0) - Vec4::ONE, v * (2.0 / 1023.0) - Vec4::ONE);
-        let w = Vec4::ONE - u.abs() - v.abs();
-        let fold = (-w).max(Vec4::ZERO);
-        let axis = Vectors { x: u - fold.copysign(u), y: v - fold.copysign(v), z: w };
-        let length = axis.length();
-        let (facing, across) = (d.dots(axis) / length, d.cross(axis).length() / length);
-        let steps = part(20, 0xfff);
-        let (cos, sin) = cos_sin(steps * (std::f32::consts::FRAC_PI_2 / 4094.0));
-        let above = facing * cos - across * sin - radius;
         let wide = 4.0 * margin;
-        // What looks all ways never is; and where that is not asked, nothing.
-        let known = if self.back { all(4094.5) } else { all(-1.0) };
-        let known = steps.cmplt(known);
-        let is_away = known & above.cmpgt(wide);
-        let is_front = !known | above.cmplt(-wide);
+        let none = BVec4A::splat(false);
+        let (facing, above, known, is_away, is_front) = if BACK {
+            let part = |shift: u32, mask: u32| {
+                let of = |c: u32| (c >> shift & mask) as i32 as f32;
+                Vec4::new(of(code[0]), of(code[1]), of(code[2]), of(code[3]))
+            };
+            let (u, v) = (part(0, 0x3ff), part(10, 0x3ff));
+            let (u, v) = (u * (2.0 / 1023.0) - Vec4::ONE, v * (2.0 / 1023.0) - Vec4::ONE);
+            let w = Vec4::ONE - u.abs() - v.abs();
+            let fold = (-w).max(Vec4::ZERO);
+            let axis = Vectors { x: u - fold.copysign(u), y: v - fold.copysign(v), z: w };
+            let length = axis.length();
+            let (facing, across) = (d.dots(axis) / length, d.cross(axis).length() / length);
+            let steps = part(20, 0xfff);
+            let (cos, sin) = cos_sin(steps * (std::f32::consts::FRAC_PI_2 / 4094.0));
+            let above = facing * cos - across * sin - radius;
+            // What looks all ways never is.
+            let known = steps.cmplt(all(4094.5));
+            (facing, above, known, known & above.cmpgt(wide), !known | above.cmplt(-wide))
+        } else {
+            (Vec4::ZERO, Vec4::ZERO, none, none, !none)
+        };
         let unwanted = is_fine | is_out | is_away;
         let wanted = is_coarse & is_in & is_front;
         let mut slack = Vec4::ZERO;
         if SLACK {
-            let far = (self.far[0] * p.length() + self.far[1] * away + all(self.far[2])).max(Vec4::ONE);
+            let far = match self.far {
+                [0.0, 0.0, more] => all(more).max(Vec4::ONE),
+                [middle, eye, more] => (middle * p.length() + eye * away + all(more)).max(Vec4::ONE),
+            };
             let grows = error * self.grows;
             let eye = self.eye_part;
             // How far depths are beyond, each by how fast it changes.
@@ -245,17 +313,22 @@ impl Sieve {
                 .min((low - all(self.near)) * third);
             let until_in = (-inside - margin) / far;
             let until_out = (inside - margin) / far;
-            let until_front = (above - wide) * eye;
-            let front = Vec4::select(facing.cmple(Vec4::ZERO), radius - facing, -above);
-            let until_away = Vec4::select(known, (front - wide) * eye, all(f32::MAX));
-            let none = Vec4::ZERO;
-            let of_unwanted = Vec4::select(is_fine, until_coarse, none)
-                .max(Vec4::select(is_out, until_in, none))
-                .max(Vec4::select(is_away, until_front, none));
-            let of_wanted = until_fine.min(until_out).min(until_away);
-            slack = Vec4::select(wanted, of_wanted, of_unwanted).max(none);
+            let mut of_unwanted = Vec4::select(is_fine, until_coarse, Vec4::ZERO).max(Vec4::select(
+                is_out,
+                until_in,
+                Vec4::ZERO,
+            ));
+            let mut of_wanted = until_fine.min(until_out);
+            if BACK {
+                let until_front = (above - wide) * eye;
+                let front = Vec4::select(facing.cmple(Vec4::ZERO), radius - facing, -above);
+                let until_away = Vec4::select(known, (front - wide) * eye, all(f32::MAX));
+                of_unwanted = of_unwanted.max(Vec4::select(is_away, until_front, Vec4::ZERO));
+                of_wanted = of_wanted.min(until_away);
+            }
+            slack = Vec4::select(wanted, of_wanted, of_unwanted).max(Vec4::ZERO);
         }
-        Sieved { wanted: wanted.bitmask(), unwanted: unwanted.bitmask(), slack: slack.to_array() }
+        Sieved { wanted: wanted.bitmask(), unwanted: unwanted.bitmask(), slack, away, margin }
     }
 }
 

@@ -8,9 +8,10 @@
 //! s <= away and a = away + s: as long as the sum M + a T has grown by less than s, the eye has moved by less than s, so it is nearer to p than a, and no function has changed by s. A change of the tolerance adds to M what it adds to the
 //! distance of a clock. Sums are kept in f64, times in f32 with a margin for its rounding, and all begins anew when the sums become large.
 
-use super::{AHEAD, About, Clock, Found, Judges, Many, Pace, SAFE, STEPS};
+use super::{AHEAD, About, Clock, Judges, Many, Pace, SAFE, STEPS, Verdict};
 use crate::selective::Lens;
 use crate::selective::entry::Entry;
+use glam::Vec4;
 
 /// Sums of what lenses have moved and turned.
 #[derive(Clone, Debug)]
@@ -49,6 +50,12 @@ impl Due {
     pub(crate) const NOW: Due = Due { away: 0.0, until: f32::NEG_INFINITY };
     /// Of what is not there.
     pub(crate) const NEVER: Due = Due { away: 0.0, until: f32::INFINITY };
+
+    /// At a time: of what turning counts so much for. What is no time is now.
+    #[inline(always)]
+    pub(in crate::selective) fn new(away: f32, until: f32) -> Due {
+        if until < f32::INFINITY && away < f32::INFINITY { Due { away, until } } else { Due::NOW }
+    }
 }
 
 impl Clocks {
@@ -142,11 +149,19 @@ impl Clocks {
 
     /// Whether each is needed, or to be kept, and when that is to be looked at again.
     pub(crate) fn look(&self, many: &Many<'_>, entries: &[Entry], out: &mut Looked) {
-        out.found.clear();
-        many.look(entries, &mut out.found);
-        out.due.clear();
-        let due = |(e, f): (&Entry, &Found)| self.due(&many.judges, e, f64::from(f.slack));
-        out.due.extend(entries.iter().zip(&out.found).map(due));
+        out.0.clear();
+        let now = self.apart.then(|| Now {
+            moved: self.moved as f32,
+            turned: self.turned as f32,
+            most: self.most() as f32,
+        });
+        let one = |e: &Entry, v: Verdict| (v.wanted, self.due(&many.judges, e, v.slack));
+        many.look_until(now, entries, one, &mut out.0);
+    }
+
+    /// The most slack that counts: as far as changes of the tolerance are looked after.
+    fn most(&self) -> f64 {
+        AHEAD as f64 / STEPS * self.all.pace.diagonal
     }
 
     /// [`AHEAD_OF`] frames like the last before a time, and whether that has come; then a part of them from now.
@@ -168,8 +183,7 @@ impl Clocks {
     /// When something that has this slack is to be looked at again.
     #[inline]
     fn due(&self, judges: &Judges<'_>, e: &Entry, slack: f64) -> Due {
-        // As far as changes of the tolerance are looked after.
-        let most = AHEAD as f64 / STEPS * self.all.pace.diagonal;
+        let most = self.most();
         let (away, slack) = match judges.lenses {
             [lens] if self.apart => {
                 let away = (e.centre.as_dvec3() - lens.eye).length();
@@ -185,17 +199,33 @@ impl Clocks {
     }
 }
 
+/// The sums, and the most slack that counts, in single precision.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::selective) struct Now {
+    moved: f32,
+    turned: f32,
+    most: f32,
+}
+
+impl Now {
+    /// As [`Clocks::due`], of what is so far away and has so much slack, the former by as much as `margin` off: how much turning counts, and until when.
+    #[inline(always)]
+    pub(in crate::selective) fn due(&self, away: Vec4, slack: Vec4, margin: Vec4) -> (Vec4, Vec4) {
+        let slack = slack.min(away - margin).min(Vec4::splat(self.most)).max(Vec4::ZERO);
+        let away = away + margin + slack;
+        let until = Vec4::splat(self.moved) + away * self.turned + slack * SAFE as f32;
+        (away, until - until * ROUNDED as f32)
+    }
+}
+
 /// What was found out about many.
 #[derive(Debug, Default)]
-pub(crate) struct Looked {
-    found: Vec<Found>,
-    due: Vec<Due>,
-}
+pub(crate) struct Looked(Vec<(bool, Due)>);
 
 impl Looked {
     /// Whether each is needed, or to be kept, and when to look again.
     pub(crate) fn each(&self) -> impl Iterator<Item = (bool, Due)> + '_ {
-        self.found.iter().zip(&self.due).map(|(f, &due)| (f.wanted, due))
+        self.0.iter().copied()
     }
 }
 
