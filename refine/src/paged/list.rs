@@ -1,12 +1,14 @@
 //! Splits that could be made or undone next, and when to look at them: the times apart, as most frames look at few of many.
 //!
 //! Entries have places that are told by what they are of, and stay there while they are not to be asked: so nothing is moved, or looked for. Few frames ask all times. From time to time all are, for those that
-//! may come before a *horizon*, some frames like the last from now; until lenses have passed that, frames ask these alone.
+//! may come before a *horizon*, some frames like the last from now; until lenses have passed that, frames ask these alone. Of these in turn, those before a nearer horizon are asked in every frame and the others in few.
 
 use crate::selective::{Clocks, Due, Entry, Sums};
 
 /// Frames to the horizon, at most.
 const FRAMES: f64 = 32.0;
+/// Frames to the nearer one.
+const NEAR: f64 = 4.0;
 
 /// More bytes that an array of such a capacity takes with room for so many, and those of the old one while it is filled.
 pub(super) fn grown<T>(capacity: usize, to: usize) -> [usize; 2] {
@@ -25,6 +27,9 @@ pub(super) struct List {
     /// Places that are due before the horizon, and when. What has been told otherwise since is still there, and left out when it comes.
     soon: Vec<(u32, Due)>,
     horizon: Option<Sums>,
+    /// Those of them that are due before the nearer horizon.
+    near: Vec<(u32, Due)>,
+    near_horizon: Option<Sums>,
     /// Places that are due in this frame, ascending; some may have been taken out since.
     ready: Vec<u32>,
     /// A bit for every place, all 0: to sort with.
@@ -40,7 +45,7 @@ impl List {
     pub(super) fn bytes(&self) -> usize {
         size_of::<Entry>() * self.of.capacity()
             + size_of::<Due>() * self.due.capacity()
-            + size_of::<(u32, Due)>() * self.soon.capacity()
+            + size_of::<(u32, Due)>() * (self.soon.capacity() + self.near.capacity())
             + size_of::<u32>() * self.ready.capacity()
             + size_of::<u64>() * self.sorting.capacity()
     }
@@ -54,6 +59,7 @@ impl List {
         grow(&mut self.due, places);
         grow(&mut self.sorting, places.div_ceil(64));
         grow(&mut self.soon, there);
+        grow(&mut self.near, there.div_ceil(4));
         grow(&mut self.ready, there);
     }
 
@@ -65,6 +71,7 @@ impl List {
             grown::<Due>(self.due.capacity(), places),
             grown::<u64>(sorting, places.div_ceil(64)),
             grown::<(u32, Due)>(self.soon.capacity(), there),
+            grown::<(u32, Due)>(self.near.capacity(), there.div_ceil(4)),
             grown::<u32>(self.ready.capacity(), there),
         ];
         all.iter().fold([0; 2], |sum, g| [sum[0] + g[0], sum[1].max(g[1])])
@@ -125,14 +132,20 @@ impl List {
     pub(super) fn set_due(&mut self, at: u32, due: Due) {
         let Some(d) = self.due.get_mut(at as usize) else { return };
         *d = due;
-        if self.horizon.is_some_and(|h| h.have_reached(due)) {
-            // More than there is room for: then all are asked again.
-            if self.soon.len() >= self.soon.capacity().min(self.ready.capacity()) {
-                self.forget();
-            } else {
-                self.soon.push((at, due));
-            }
+        if !self.horizon.is_some_and(|h| h.have_reached(due)) {
+            return;
         }
+        // More than there is room for: then all are asked again.
+        if self.soon.len() + self.near.len() >= self.soon.capacity().min(self.ready.capacity()) {
+            return self.forget();
+        }
+        if self.near_horizon.is_some_and(|h| h.have_reached(due)) {
+            if self.near.len() < self.near.capacity() {
+                return self.near.push((at, due));
+            }
+            self.near_horizon = None;
+        }
+        self.soon.push((at, due));
     }
 
     /// Begins a frame: finds the places that are due; `all`: those of all entries. Returns how many there are.
@@ -146,7 +159,7 @@ impl List {
             return self.ready.len();
         }
         match self.horizon.filter(|h| h.include(now)) {
-            Some(_) => self.ask_soon(now),
+            Some(_) => self.ask_soon(now, clock),
             None => {
                 // So many that asking all, shared by the frames to the horizon, takes as long as asking those that come before it.
                 let frames = self.of.len() as f64 / self.ready.len().max(1) as f64;
@@ -160,8 +173,9 @@ impl List {
     }
 
     fn forget(&mut self) {
-        self.horizon = None;
+        (self.horizon, self.near_horizon) = (None, None);
         self.soon.clear();
+        self.near.clear();
     }
 
     /// Most do not come before the horizon: asked without a branch for each.
@@ -182,17 +196,35 @@ impl List {
         }
     }
 
-    fn ask_soon(&mut self, now: Sums) {
+    fn ask_soon(&mut self, now: Sums, clock: &Clocks) {
         self.ready.clear();
         let (due, ready) = (&self.due, &mut self.ready);
-        self.soon.retain(|&(at, told)| {
+        let mut is_waiting = |&(at, told): &(u32, Due)| {
             let is_due = now.have_reached(told);
             // It may have been told otherwise, or be of another entry, since.
             if is_due && due.get(at as usize) == Some(&told) {
                 ready.push(at);
             }
             !is_due
-        });
+        };
+        self.near.retain(&mut is_waiting);
+        if !self.near_horizon.is_some_and(|h| h.include(now)) {
+            let (horizon, near) = (clock.horizon(NEAR), &mut self.near);
+            let mut whole = true;
+            self.soon.retain(|s| {
+                if !is_waiting(s) {
+                    return false;
+                }
+                let is_near = horizon.have_reached(s.1);
+                let has_room = near.len() < near.capacity();
+                whole &= !is_near || has_room;
+                if is_near && has_room {
+                    near.push(*s);
+                }
+                !(is_near && has_room)
+            });
+            self.near_horizon = whole.then_some(horizon);
+        }
         // Each once, though it was put there, or told, more than once since.
         ready.iter().for_each(|&at| self.sorting[at as usize / 64] |= 1 << (at % 64));
         ready.clear();
