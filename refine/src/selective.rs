@@ -21,6 +21,7 @@ mod entry;
 mod front;
 mod index;
 mod lens;
+mod marks;
 mod morph;
 mod motions;
 mod output;
@@ -52,6 +53,7 @@ pub use timed::TimedMorph;
 
 use crate::aif::NONE;
 use crate::hierarchy::Hierarchy;
+use marks::Marks;
 use standoff::Standoff;
 use std::sync::Arc;
 
@@ -77,7 +79,7 @@ pub struct View {
     hierarchy: Arc<Hierarchy>,
     front: Front,
     /// Bits for walks over what splits depend on; none is set between frames.
-    marked: Vec<u64>,
+    marked: Marks,
     clock: Clock,
     standoff: Standoff,
     /// The record at which a limit cut short the last frame's looks.
@@ -92,7 +94,7 @@ impl View {
     pub fn new(hierarchy: Arc<Hierarchy>) -> View {
         let front = Front::new(hierarchy.mesh(), &hierarchy.forest);
         View {
-            marked: vec![0; hierarchy.forest.len().div_ceil(64)],
+            marked: Marks::new(hierarchy.forest.len()),
             clock: Clock::new(hierarchy.bounds.diagonal),
             standoff: Standoff::NONE,
             resume: 0,
@@ -162,7 +164,7 @@ impl View {
     /// Bytes held: those that grow with the mesh shown, and tables over the finest mesh.
     pub fn bytes(&self) -> (usize, usize) {
         let (shown, tables) = self.front.bytes();
-        (shown, tables + 8 * self.marked.len())
+        (shown, tables + self.marked.bytes())
     }
 
     /// Replaces `out` by split `i` and all it depends on that is not applied, in an order in which they can be; false (and nothing of use) if that are more than `most`.
@@ -179,9 +181,8 @@ impl View {
     fn mark(&mut self, splits: impl Iterator<Item = u32>, most: usize, out: &mut Vec<u32>) -> bool {
         let (front, needs, marked) = (&self.front, &self.hierarchy.forest.needs, &mut self.marked);
         let mut add = |i: u32, out: &mut Vec<u32>| {
-            let (word, bit) = (i as usize / 64, 1u64 << (i % 64));
-            if marked[word] & bit == 0 && !front.is_applied(i) {
-                marked[word] |= bit;
+            if !marked.has(i) && !front.is_applied(i) {
+                marked.add_if(i, true);
                 out.push(i);
             }
         };
@@ -197,13 +198,7 @@ impl View {
 
     /// Takes marks away.
     fn unmark(&mut self, splits: &[u32]) {
-        splits.iter().for_each(|&j| self.marked[j as usize / 64] &= !(1 << (j % 64)));
-    }
-
-    /// Split `i` is marked.
-    #[inline]
-    fn is_marked(&self, i: u32) -> bool {
-        self.marked[i as usize / 64] >> (i % 64) & 1 != 0
+        splits.iter().for_each(|&j| self.marked.remove(j));
     }
 
     /// Finds where the cuts of splits lie, as far as their faces are there, and reads what applying them begins with: the processor then waits for all of that together.

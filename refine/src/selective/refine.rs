@@ -11,7 +11,6 @@ use super::survey::LOT;
 use super::{Split, View};
 use crate::hierarchy::Hierarchy;
 use glam::Vec3;
-use std::ops::Range;
 
 /// A split that may come next at a vertex, how many of its splits come before, and where it stands then, about the origin of the bounds.
 #[derive(Clone, Copy, Debug, Default)]
@@ -105,44 +104,29 @@ impl View {
     /// Applies all that is needed.
     fn refine_wholly(&mut self, judges: &Judges<'_>, meter: &mut Meter<'_>, mut wave: Vec<Open>) {
         let many = judges.next(&self.clock);
-        let (mut needed, mut low, mut high) = (0, usize::MAX, 0);
+        let mut needed = 0;
         while !wave.is_empty() {
             needed += wave.len();
-            for o in &wave {
-                let word = o.split as usize / 64;
-                self.marked[word] |= 1 << (o.split % 64);
-                (low, high) = (low.min(word), high.max(word + 1));
-            }
+            wave.iter().for_each(|o| self.marked.add_if(o.split, true));
             wave = self.next_wave(&many, &wave);
         }
         // What they depend on, the last first: what that depends on is yet to come.
-        let mut word = high;
-        while word > low {
-            word -= 1;
-            let mut left = u64::MAX;
-            while self.marked[word] & left != 0 {
-                let bit = 63 - (self.marked[word] & left).leading_zeros();
-                left = (1 << bit) - 1;
-                for d in self.hierarchy.forest.needs.of(64 * word as u32 + bit).iter() {
-                    let at = d as usize / 64;
-                    self.marked[at] |= u64::from(!self.front.is_applied(d)) << (d % 64);
-                    low = low.min(at);
-                }
-            }
-        }
-        let all = self.apply_marked(low..high);
+        let View { front, hierarchy, marked, .. } = self;
+        marked.each_from_last(|i, marked| {
+            hierarchy.forest.needs.of(i).iter().for_each(|d| marked.add_if(d, !front.is_applied(d)));
+        });
+        let all = self.apply_marked();
         meter.done.splits += all;
         meter.done.forced += all - needed;
     }
 
-    /// Applies the splits that are marked in these words, and takes the marks away; what they depend on is applied, or among them. Returns how many they were.
-    fn apply_marked(&mut self, words: Range<usize>) -> usize {
+    /// Applies the splits that are marked, and takes the marks away; what they depend on is applied, or among them. Returns how many they were.
+    fn apply_marked(&mut self) -> usize {
         let mut lot = Vec::with_capacity(LOT);
-        let mut all = 0;
-        let marked = self.marked.get(words.clone()).unwrap_or_default();
-        self.front.reserve(marked.iter().map(|w| w.count_ones() as usize).sum());
-        for word in words {
-            let mut bits = std::mem::take(&mut self.marked[word]);
+        let (mut all, mut from) = (0, 0);
+        self.front.reserve(self.marked.count());
+        while let Some((word, mut bits)) = self.marked.take_word(from) {
+            from = word;
             while bits != 0 {
                 lot.push(64 * word as u32 + bits.trailing_zeros());
                 bits &= bits - 1;
@@ -205,7 +189,7 @@ impl View {
             }
             for (k, o) in lot.iter().enumerate() {
                 // Others may have needed it before.
-                if !self.is_marked(o.split) {
+                if !self.marked.has(o.split) {
                     if meter.is_full(faces) {
                         meter.done.refused += lot.len() - k;
                         break;
@@ -222,9 +206,7 @@ impl View {
             each_needed_below(&h, &many, &done, |o, e| queue.push(*o, judges.rank(e)));
         }
         meter.done.refused += queue.len();
-        let words = plan.iter().map(|&i| i as usize / 64);
-        let (low, high) = words.fold((usize::MAX, 0), |(low, high), w| (low.min(w), high.max(w + 1)));
-        meter.done.splits += self.apply_marked(low..high);
+        meter.done.splits += self.apply_marked();
         meter.done.forced += plan.len() - needed;
     }
 
