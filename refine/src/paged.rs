@@ -72,7 +72,7 @@ pub enum PagedError {
 
 /// A mesh of a file between base and full detail, finer where a view needs it, whose parts are read when they are needed.
 ///
-/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 85 B for a split of a resident page by the ring rule, 70 by that of cuts, and 265 B, up to an eighth more, for a vertex shown.
+/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 85 B for a split of a resident page by the ring rule, 70 by that of cuts, and 271 B, up to an eighth more, for a vertex shown.
 #[derive(Debug)]
 pub struct PagedView<S> {
     shelf: Shelf<S>,

@@ -593,6 +593,40 @@ fn a_coherent_flight_shows_what_looking_at_everything_would() {
     }
 }
 
+/// From outside to inside and out again without a jump, turning all of the way: slack is measured otherwise there.
+#[test]
+fn flights_into_a_mesh_and_out_show_what_looking_at_everything_would() {
+    for (name, rule) in both(&["scan", "terrain"]) {
+        let h = hierarchy_by(rule, name, 4000);
+        let (centre, size) = h.extent();
+        let (mut view, mut applied) = (View::new(h.clone()), [0; 2]);
+        for frame in 0..120usize {
+            let t = 0.01 * frame as f64;
+            let distance = 0.72 - 0.01 * (frame.min(120 - frame) as f64);
+            let arm = DVec3::new(t.sin(), 0.2, t.cos()).normalize() * distance * size;
+            let camera = Camera::new(&CameraParameters {
+                eye: centre + arm,
+                target: centre + arm - glam::DQuat::from_rotation_y(0.02 * (frame as f64).sin()) * arm,
+                up: DVec3::Y,
+                projection: Projection::Perspective { fov_y_deg: 45.0 },
+                width: 1280,
+                height: 720,
+                near: 1e-3 * size,
+                far: 10.0 * size,
+            });
+            let cull = [Cull::Frustum, Cull::All][frame / 40 % 2];
+            let lens = Lens::new(&h, &camera.unwrap(), &DMat4::IDENTITY, 0.7, cull).unwrap();
+            assert!(view.adapt(&lens, &Limits::default()).complete);
+            let mut fresh = View::new(h.clone());
+            let all = fresh.adapt(&lens, &Limits::default());
+            assert!(view.applied().eq(fresh.applied()), "{name}: frame {frame}");
+            applied[usize::from(frame > 30 && frame < 90)] += all.splits;
+        }
+        assert!(applied.iter().all(|&n| n > 1000), "{name}: {applied:?}");
+        assert_sound(&view);
+    }
+}
+
 /// As `fly --path circle` sees it from one side: the middle in the middle of the picture.
 fn from_side(h: &Hierarchy, side: DVec3, distance: f64) -> Camera {
     let (centre, size) = h.extent();
@@ -687,7 +721,7 @@ fn memory_grows_with_what_is_shown() {
         let each = shown as f64 / view.vertex_count() as f64;
         // Below some thousand vertices what vectors hold in reserve counts.
         assert!(each < 64.0 || view.vertex_count() < 2000, "{each} B for each of {}", view.vertex_count());
-        assert!(tables <= 3 * n / 8 + 32, "{tables}");
+        assert!(tables <= 3 * n / 8 + n / 512 + 32, "{tables}");
         if view.vertex_count() < before {
             assert_sound(&view);
             assert!(

@@ -5,10 +5,10 @@
 //!
 //! **Why it stands.** Let M be the sum of how far the eye has moved from frame to frame, and T that of how far the axes of the view have turned (the length of the largest difference of unit normals of the
 //! picture's planes). From one frame to the next a depth, or a distance from a plane, of a place p changes by at most dM + dT |p - eye|; a distance from the eye, or what tells how far a cone is turned, by at most dM. With slack
-//! s <= away and a = away + s: as long as the sum M + a T has grown by less than s, the eye has moved by less than s, so it is nearer to p than a, and no function has changed by s. A change of the tolerance adds to M what it adds to the
+//! s and a = away + s: as long as the sum M + a T has grown by less than s, the eye has moved by less than s, so it is nearer to p than a, and no function has changed by s. A change of the tolerance adds to M what it adds to the
 //! distance of a clock. Sums are kept in f64, times in f32 with a margin for its rounding, and all begins anew when the sums become large.
 
-use super::{AHEAD, About, Clock, Judges, Many, Pace, SAFE, STEPS, Verdict};
+use super::{About, Clock, Judges, LONGEST, Many, Pace, SAFE, Verdict};
 use crate::selective::Lens;
 use crate::selective::entry::Entry;
 use glam::Vec4;
@@ -161,7 +161,7 @@ impl Clocks {
 
     /// The most slack that counts: as far as changes of the tolerance are looked after.
     fn most(&self) -> f64 {
-        AHEAD as f64 / STEPS * self.all.pace.diagonal
+        LONGEST * self.all.pace.diagonal
     }
 
     /// [`AHEAD_OF`] frames like the last before a time, and whether that has come; then a part of them from now.
@@ -183,11 +183,14 @@ impl Clocks {
     /// When something that has this slack is to be looked at again.
     #[inline]
     fn due(&self, judges: &Judges<'_>, e: &Entry, slack: f64) -> Due {
+        if slack.is_nan() {
+            return Due::NOW;
+        }
         let most = self.most();
         let (away, slack) = match judges.lenses {
             [lens] if self.apart => {
                 let away = (e.centre.as_dvec3() - lens.eye).length();
-                let slack = slack.min(away).min(most);
+                let slack = slack.min(most);
                 (away + slack, slack)
             }
             _ => (0.0, slack.min(most)),
@@ -211,7 +214,7 @@ impl Now {
     /// As [`Clocks::due`], of what is so far away and has so much slack, the former by as much as `margin` off: how much turning counts, and until when.
     #[inline(always)]
     pub(in crate::selective) fn due(&self, away: Vec4, slack: Vec4, margin: Vec4) -> (Vec4, Vec4) {
-        let slack = slack.min(away - margin).min(Vec4::splat(self.most)).max(Vec4::ZERO);
+        let slack = slack.min(Vec4::splat(self.most)).max(Vec4::ZERO);
         let away = away + margin + slack;
         let until = Vec4::splat(self.moved) + away * self.turned + slack * SAFE as f32;
         (away, until - until * ROUNDED as f32)
