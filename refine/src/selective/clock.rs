@@ -75,7 +75,7 @@ pub(crate) struct Clock {
 
 /// The most steps ahead that a time can be: half of all, less some.
 const AHEAD: u16 = 32_000;
-/// What slack counts for at most, of a diagonal: from outside that many steps are it.
+/// The most slack that counts from outside, of a diagonal: then changes of the tolerance are bounded.
 const LONGEST: f64 = 0.25;
 /// From inside turning is taken at this part of a diagonal: on flights above the ground it then counts about as much as moving does. Over generated terrain of 4,097 x 4,097 and over Grand Canyon frames take half to two thirds of the time
 /// that they take with 1, and within a tenth of each other with 1/4, 1/8 and 1/16.
