@@ -39,11 +39,20 @@ use crate::progressive::{Damage, Fans};
 use crate::selective::{Clocks, Cull, Entry, Followed, Lens, LensError, Motions};
 use crate::view::Camera;
 use glam::{DMat4, DVec3, Vec3};
-use list::{List, grown};
+use list::{List, PLACE, THERE, grown};
 use pool::Hot;
 use shelf::Shelf;
 use std::sync::Arc;
 use timed::{CHANGE, MOTION};
+
+/// Bytes that arrays take for a vertex shown: its record, two slots of faces, two places of what could come next and one of what could be undone.
+const SHOWN: usize = size_of::<Hot>() + 2 * (2 * size_of::<[u32; 3]>() + 1) + 3 * PLACE + 2 * THERE;
+
+/// Of what is free, the part that arrays may take at a time to grow further than they must: pages have the rest.
+const PART_AHEAD: usize = 4;
+
+/// The part of themselves that arrays grow by at least, so that growing costs little in sum.
+const LEAST_AHEAD: usize = 8;
 
 /// A view that pages its mesh in has failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -72,7 +81,7 @@ pub enum PagedError {
 
 /// A mesh of a file between base and full detail, finer where a view needs it, whose parts are read when they are needed.
 ///
-/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 85 B for a split of a resident page by the ring rule, 70 by that of cuts, and 271 B, up to an eighth more, for a vertex shown.
+/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 85 B for a split of a resident page by the ring rule, 70 by that of cuts, and 271 B for a vertex shown, up to twice as many while a part of what is free suffices for that, up to an eighth more where it does not.
 #[derive(Debug)]
 pub struct PagedView<S> {
     shelf: Shelf<S>,
@@ -288,12 +297,13 @@ impl<S: ByteRanges> PagedView<S> {
         self.shelf.resident()
     }
 
-    /// Drops all pages that hold nothing that is shown. Returns the bytes that were freed.
+    /// Drops all pages that hold nothing that is shown, and room that was made for more of it. Returns the bytes that were freed.
     pub fn trim(&mut self) -> usize {
-        let before = self.shelf.bytes();
+        let before = self.bytes();
         self.shelf.clock += 1;
         while self.shelf.evict_one() {}
-        before - self.shelf.bytes()
+        self.give_back();
+        before - self.bytes()
     }
 
     /// Before the first frame, when others have what they cannot do without, sets room aside for pages that are made ahead; gives it back once the limit has become too small.
@@ -307,8 +317,13 @@ impl<S: ByteRanges> PagedView<S> {
         self.begun = true;
     }
 
+    /// Bytes that are free for what is kept.
+    fn free(&self) -> usize {
+        self.limit.saturating_sub(self.bytes() + self.shelf.most_at_once())
+    }
+
     /// True once `more` bytes fit beside what is held; pages that are not in use go if they must.
-    fn make_room(&mut self, more: usize) -> bool {
+    fn make_room_of_pages(&mut self, more: usize) -> bool {
         loop {
             if self.bytes() + self.shelf.most_at_once() + more <= self.limit {
                 return true;
@@ -319,52 +334,131 @@ impl<S: ByteRanges> PagedView<S> {
         }
     }
 
-    /// Room for `splits` more to be applied, in all arrays that grow with the mesh.
-    fn reserve(&mut self, splits: usize) -> bool {
-        // An eighth more each time, so that growing costs little in sum.
-        let ask = |len: usize, cap: usize| if len <= cap { 0 } else { len.max(cap + cap / 8) + 64 };
-        let pool = &self.shelf.pool;
-        let records = ask(pool.alive() + splits, pool.of.capacity().min(self.last.capacity()[0]));
-        let there = ask(self.led + splits, self.last.capacity()[1]);
-        let open_there = ask(self.shelf.base.vertices() + self.led + splits, self.open.capacity()[1]);
-        let beside = self.beside * (self.pending + splits);
-        let (n0, m0) = (self.shelf.base.vertices(), self.shelf.head.base_faces as usize);
-        let (places, slots) = ([n0 + 2 * records, records], m0 + 2 * records);
-        let mut bytes = beside;
-        if records + there + open_there > 0 {
-            // One array after the other.
-            let of_slots = [
-                grown::<Hot>(pool.of.capacity(), records),
-                grown::<[u32; 3]>(self.fans.corners.capacity(), slots),
-                grown::<[u32; 3]>(self.fans.links.capacity(), slots),
-                grown::<u64>(self.touched.capacity(), slots.div_ceil(64)),
-            ];
-            let lists = [self.open.growth([places[0], open_there]), self.last.growth([places[1], there])];
-            let [more, most] =
-                of_slots.iter().chain(&lists).fold([0; 2], |sum, g| [sum[0] + g[0], sum[1].max(g[1])]);
-            bytes += more + most;
-        }
-        let moving = if self.motions.is_some() && !self.at_once { CHANGE * splits } else { 0 };
-        if bytes + moving == 0 {
-            return true;
-        }
-        if !self.make_room(bytes + moving) {
-            // Better at once than not at all.
-            if moving == 0 || !self.make_room(bytes) {
-                return false;
-            }
-            self.jump();
-        }
+    /// The same; what arrays have grown ahead is given back if they must.
+    fn make_room(&mut self, more: usize) -> bool {
+        self.make_room_of_pages(more) || (self.give_back() > 0 && self.make_room_of_pages(more))
+    }
+
+    /// Records of splits, and entries of both lists, that there is room for.
+    fn room(&self) -> [usize; 3] {
+        let records = self.shelf.pool.of.capacity().min(self.last.capacity()[0]);
+        [records, self.last.capacity()[1], self.open.capacity()[1]]
+    }
+
+    /// How many of each are needed, with so many splits more.
+    fn needed_room(&self, splits: usize) -> [usize; 3] {
+        let led = self.led + splits;
+        [self.shelf.pool.alive() + splits, led, self.shelf.base.vertices() + led]
+    }
+
+    /// Bytes of growing to room for so many: more in all, and those of the largest array that is there until its new one is filled.
+    fn growth(&self, [records, there, open_there]: [usize; 3]) -> usize {
+        let (places, slots) = self.places(records);
+        let pool = &self.shelf.pool.of;
+        // One array after the other.
+        let of_slots = [
+            grown::<Hot>(pool.capacity(), records),
+            grown::<[u32; 3]>(self.fans.corners.capacity(), slots),
+            grown::<[u32; 3]>(self.fans.links.capacity(), slots),
+            grown::<u64>(self.touched.capacity(), slots.div_ceil(64)),
+        ];
+        let lists = [self.open.growth([places, open_there]), self.last.growth([records, there])];
+        let [more, most] =
+            of_slots.iter().chain(&lists).fold([0; 2], |sum, g| [sum[0] + g[0], sum[1].max(g[1])]);
+        more + most
+    }
+
+    /// Places in the list of what could come next, and slots of faces, for so many records.
+    fn places(&self, records: usize) -> (usize, usize) {
+        (self.shelf.base.vertices() + 2 * records, self.shelf.head.base_faces as usize + 2 * records)
+    }
+
+    /// Room for so many, which fits.
+    fn grow(&mut self, [records, there, open_there]: [usize; 3]) {
         fn grow<T>(v: &mut Vec<T>, to: usize) {
             v.reserve_exact(to.saturating_sub(v.len()));
         }
+        let (places, slots) = self.places(records);
         grow(&mut self.shelf.pool.of, records);
         grow(&mut self.fans.corners, slots);
         grow(&mut self.fans.links, slots);
         grow(&mut self.touched, slots.div_ceil(64));
-        self.open.reserve_to([places[0], open_there]);
-        self.last.reserve_to([places[1], there]);
+        self.open.reserve_to([places, open_there]);
+        self.last.reserve_to([records, there]);
+    }
+
+    /// Room for `splits` more to be applied, in all arrays that grow with the mesh.
+    fn reserve(&mut self, splits: usize) -> bool {
+        let (room, needed) = (self.room(), self.needed_room(splits));
+        let beside = self.beside * (self.pending + splits);
+        let moving = if self.motions.is_some() && !self.at_once { CHANGE * splits } else { 0 };
+        let fits = needed.iter().zip(&room).all(|(n, r)| n <= r);
+        if fits && beside + moving == 0 {
+            return true;
+        }
+        // Those that are too small grow by so many at least.
+        let to = |ahead: usize| {
+            let mut to = [0; 3];
+            for ((to, &needed), &room) in to.iter_mut().zip(&needed).zip(&room).filter(|((_, n), r)| n > r) {
+                *to = needed.max(room + (room / LEAST_AHEAD).max(ahead)) + 64;
+            }
+            to
+        };
+        if !fits {
+            let ahead = to(self.vertices_ahead(room[0]));
+            let bytes = self.growth(ahead) + beside + moving;
+            if bytes <= self.free() {
+                self.grow(ahead);
+                return true;
+            }
+        }
+        let least = to(0);
+        let bytes = beside + if fits { 0 } else { self.growth(least) };
+        if !self.make_room_of_pages(bytes + moving) {
+            // Better at once than not at all.
+            if moving == 0 || !self.make_room_of_pages(bytes) {
+                return false;
+            }
+            self.jump();
+        }
+        if !fits {
+            self.grow(least);
+        }
         true
+    }
+
+    /// By how many vertices arrays with room for so many grow ahead: as many again, as far as that takes a part of what is free only.
+    fn vertices_ahead(&self, room: usize) -> usize {
+        room.min(self.free() / PART_AHEAD / SHOWN).min(self.splits().saturating_sub(room))
+    }
+
+    /// After the first frame: so arrays do not grow in one of the next, where copying them would take longer than all else.
+    fn grow_ahead(&mut self) {
+        let needed = self.needed_room(0);
+        let ahead = self.vertices_ahead(needed[0]);
+        let to = needed.map(|n| n + ahead);
+        if self.growth(to) <= self.free() {
+            self.grow(to);
+        }
+    }
+
+    /// Of what arrays have grown ahead, all but the least that they grow by. Returns the bytes that were freed.
+    fn give_back(&mut self) -> usize {
+        fn shrink<T>(v: &mut Vec<T>, to: usize) {
+            v.shrink_to(to);
+        }
+        let before = self.bytes();
+        let some = |n: usize| n + n / LEAST_AHEAD;
+        let [_, there, open_there] = self.needed_room(0).map(some);
+        let records = some(self.shelf.pool.of.len());
+        let (places, slots) = self.places(records);
+        shrink(&mut self.shelf.pool.of, records);
+        shrink(&mut self.fans.corners, slots);
+        shrink(&mut self.fans.links, slots);
+        shrink(&mut self.touched, slots.div_ceil(64));
+        self.open.shrink_to([places, open_there]);
+        self.last.shrink_to([records, there]);
+        before - self.bytes()
     }
 
     /// A node is in the mesh now, in this place of the list: what replaces it, if anything, can be applied.

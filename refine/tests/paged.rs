@@ -232,6 +232,56 @@ fn chunks_that_take_much_on_the_way_are_read() {
     assert!(short > 0);
 }
 
+/// Arrays that hold what is shown grow ahead while much is free, so that frames after the first rarely copy them; what they grew is given back when pages need it, or it is asked for.
+#[test]
+fn room_made_ahead_is_used_and_given_back() {
+    let bytes = file_by(Rule::Rings, 160, "scan", 24_000, None);
+    let adapt = |view: &mut PagedView<&[u8]>, turn: f64, tau: f64| {
+        let (centre, diagonal) = view.extent();
+        let lens = view.lens(&camera(centre, diagonal, turn, 1.1), &DMat4::IDENTITY, tau, Cull::All).unwrap();
+        let done = view.adapt(&[lens], &PagedLimits::default()).unwrap();
+        assert!(view.bytes() <= view.limit(), "{} of {}", view.bytes(), view.limit());
+        done
+    };
+    let first = || {
+        let mut view = paged(&bytes, PLENTY);
+        assert!(adapt(&mut view, 0.2, 4.0).done.complete);
+        view
+    };
+    // What is shown can become half as much again, and more, in the room of the first frame.
+    let mut view = first();
+    let (shown, room) = (view.vertex_count(), view.shown_bytes());
+    assert!(adapt(&mut view, 0.2, 2.5).done.complete);
+    let more = view.vertex_count();
+    assert!(2 * more > 3 * shown && more < 2 * shown, "{more} after {shown}");
+    assert_eq!(view.shown_bytes(), room);
+    // Asked for, it is given back, but for an eighth; the next frames are the same.
+    let mut other = first();
+    let (before, each) = (other.bytes(), room / (2 * shown));
+    let freed = other.trim();
+    assert_eq!(other.bytes(), before - freed);
+    assert!(other.shown_bytes() < room * 9 / 16 + 4096 && other.shown_bytes() > each * shown);
+    assert!(adapt(&mut other, 0.2, 2.5).done.complete);
+    assert_same(&other.to_input(), &view.to_input());
+    // Where nothing is free pages take its place, if they must.
+    let mut full = first();
+    let on_the_way = needed(&bytes) - paged(&bytes, PLENTY).bytes();
+    full.set_limit(full.bytes() + on_the_way);
+    let done = adapt(&mut full, 0.2, 0.7);
+    assert!(done.fetched > 0 && done.done.splits > 0 && full.shown_bytes() < room, "{done:?}");
+    // No more than a quarter of what is free is grown ahead.
+    let (least, held) = (needed(&bytes), other.bytes());
+    let mut whole = 0;
+    for part in 0..=8 {
+        let mut view = paged(&bytes, least + held * part / 8);
+        whole += usize::from(adapt(&mut view, 0.2, 4.0).done.complete);
+        let before = view.shown_bytes();
+        view.trim();
+        assert!(before <= view.shown_bytes() + held * part / 8 / 4 + 4096);
+    }
+    assert!((1..9).contains(&whole), "{whole}");
+}
+
 /// Of a mesh of several chunks, read through little memory: what is not shown goes, and comes again.
 #[test]
 fn a_limit_is_kept_and_changes_no_mesh() {

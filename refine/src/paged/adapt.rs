@@ -140,6 +140,7 @@ impl<S: ByteRanges> PagedView<S> {
         let meter = Meter::new(&limits.limits);
         let mut frame =
             Frame { meter, fetches: limits.fetches, all: PagedDone::default(), full: false, whole: true };
+        let first = !self.begun;
         self.set_aside();
         self.shelf.next_frame();
         let judges = Judges::new(lenses, limits.limits.hysteresis);
@@ -164,6 +165,9 @@ impl<S: ByteRanges> PagedView<S> {
             let result = self.refine(&mut desk, all, &mut frame);
             self.queue.clear();
             result?;
+        }
+        if first {
+            self.grow_ahead();
         }
         self.cut = frame.meter.over || !frame.whole;
         let all = &mut frame.all;

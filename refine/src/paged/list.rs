@@ -10,6 +10,10 @@ const FRAMES: f64 = 32.0;
 /// Frames to the nearer one: slow circles over generated terrain of 4,097 x 4,097 take a seventh less with it than without, fast ones a twentieth to a tenth. Other numbers were not tried.
 const NEAR: f64 = 4.0;
 
+/// Bytes of a place, and of an entry that is there, at most.
+pub(super) const PLACE: usize = size_of::<Entry>() + size_of::<Due>() + 1;
+pub(super) const THERE: usize = 2 * size_of::<(u32, Due)>() + size_of::<u32>();
+
 /// More bytes that an array of such a capacity takes with room for so many, and those of the old one while it is filled.
 pub(super) fn grown<T>(capacity: usize, to: usize) -> [usize; 2] {
     match to.checked_sub(capacity) {
@@ -66,6 +70,16 @@ impl List {
         grow(&mut self.soon, there);
         grow(&mut self.near, near_of(there));
         grow(&mut self.ready, there);
+    }
+
+    /// Gives room for more than so many back, unless it is in use.
+    pub(super) fn shrink_to(&mut self, [places, there]: [usize; 2]) {
+        self.of.shrink_to(places);
+        self.due.shrink_to(places);
+        self.sorting.shrink_to(places.div_ceil(64));
+        self.soon.shrink_to(there);
+        self.near.shrink_to(near_of(there));
+        self.ready.shrink_to(there);
     }
 
     /// What [`List::reserve_to`] takes beside what is held: more bytes in all, and those of the largest array that is there until its new one is filled.
