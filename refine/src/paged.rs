@@ -28,6 +28,7 @@ mod ready;
 mod shelf;
 mod sight;
 mod timed;
+mod visible;
 
 pub use adapt::{PagedDone, PagedLimits};
 pub use shelf::Traffic;

@@ -128,7 +128,21 @@ impl View {
 
     /// The applied splits, ascending. O(n / 64 + those applied).
     pub fn applied(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.hierarchy.splits()).filter(|&i| self.front.is_applied(i as u32))
+        let words = self.front.applied_bits().zip((0..).step_by(64)).filter(|(word, _)| *word != 0);
+        words.flat_map(|(word, first)| {
+            let mut left = word;
+            std::iter::from_fn(move || {
+                let bit = (left != 0).then(|| left.trailing_zeros() as usize)?;
+                left &= left - 1;
+                Some(first + bit)
+            })
+        })
+    }
+
+    /// The vertices shown, ascending. O(n / 64 + those shown).
+    pub fn vertices(&self) -> impl Iterator<Item = u32> + '_ {
+        let n0 = self.hierarchy.mesh().base_vertices() as u32;
+        (0..n0).chain(self.applied().map(move |i| n0 + i as u32))
     }
 
     /// Applies split `i` and all it depends on; returns how many splits that were. O(those, times valence). Panics if there is no such split.

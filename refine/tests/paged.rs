@@ -232,6 +232,42 @@ fn chunks_that_take_much_on_the_way_are_read() {
     assert!(short > 0);
 }
 
+/// Vertices that a frustum holds are counted as one by one, wherever the mesh stands.
+#[test]
+fn visible_vertices_are_those_in_the_frustum() {
+    let o = EncodeOptions::default().with_pages(true).with_chunk(Some(300));
+    let files = [
+        file("scan", 6000, Some(Placement::Endpoint)),
+        file("torus", 3000, None),
+        written(pieces(), Method::Quadric, &o),
+    ];
+    let mut some = 0;
+    for bytes in &files {
+        let mut view = paged(bytes, PLENTY);
+        let (centre, diagonal) = view.extent();
+        let beside = DMat4::from_translation(centre + 0.3 * diagonal * DVec3::X)
+            * DMat4::from_axis_angle(DVec3::Z, 1.0)
+            * DMat4::from_scale(DVec3::new(0.5, -1.5, 1.0));
+        for k in 0..24 {
+            let (turn, far) = (0.7 * k as f64, [0.1, 0.4, 0.65, 1.1][k % 4]);
+            let c = camera(centre, diagonal, turn, far);
+            let lens = view.lens(&c, &DMat4::IDENTITY, TAU[k % 3], Cull::None).unwrap();
+            view.adapt(&[lens], &PagedLimits::default()).unwrap();
+            let (frustum, places) = (c.frustum(), [DMat4::IDENTITY, beside]);
+            let held = |v: u32| {
+                let p = view.position(v).unwrap();
+                places.iter().filter(|m| frustum.contains(m.transform_point3(p))).count()
+            };
+            let expected: usize = view.vertices().map(held).sum();
+            assert_eq!(view.visible(&frustum, &places), expected, "frame {k}");
+            assert_eq!(view.visible(&frustum, &[]), 0);
+            some += usize::from(expected > 50 && expected < 2 * view.vertex_count() - 50);
+        }
+    }
+    assert!(some > 30, "{some}");
+    assert!(paged(&files[1], PLENTY).moves_vertices() && !paged(&files[0], PLENTY).moves_vertices());
+}
+
 /// Arrays that hold what is shown grow ahead while much is free, so that frames after the first rarely copy them; what they grew is given back when pages need it, or it is asked for.
 #[test]
 fn room_made_ahead_is_used_and_given_back() {

@@ -126,8 +126,7 @@ impl Morphs {
 }
 
 fn displaced_by_error(view: &View, lenses: &[Lens], band: f64) -> Vec<(u32, DVec3)> {
-    let all = 0..view.hierarchy().mesh().vertices() as u32;
-    elsewhere(all, |v| view.position(v), |v| view.morphed_by_all(lenses, v, band)).collect()
+    elsewhere(view.vertices(), |v| view.position(v), |v| view.morphed_by_all(lenses, v, band)).collect()
 }
 
 /// The vertices that are drawn elsewhere than in their own place, and where.

@@ -7,7 +7,7 @@ use crate::progressive::Leftover;
 use crate::refine::paged::PagedView;
 use crate::refine::selective::{Lens, LensError, TimedMorph, View};
 use crate::refine::truly::TrulyView;
-use crate::refine::view::Camera;
+use crate::refine::view::{Camera, Frustum};
 use crate::scene::Scene;
 use glam::{DMat4, DVec3};
 
@@ -21,6 +21,15 @@ pub(super) trait Shown {
     fn places(&self) -> impl Iterator<Item = DVec3>;
     /// The corners of the faces, there.
     fn triangles(&self) -> impl Iterator<Item = [DVec3; 3]>;
+    /// Vertices that a frustum holds if the mesh stands in these places, those of each counted.
+    fn visible(&self, frustum: &Frustum, placed: &[DMat4]) -> usize {
+        self.places().map(|p| held(frustum, placed, p)).sum()
+    }
+}
+
+/// In how many of these places a frustum holds a vertex.
+fn held(frustum: &Frustum, placed: &[DMat4], p: DVec3) -> usize {
+    placed.iter().filter(|m| frustum.contains(m.transform_point3(p))).count()
 }
 
 /// One mesh of which all is in memory.
@@ -74,7 +83,7 @@ impl Shown for Drawn<'_> {
     }
 
     fn places(&self) -> impl Iterator<Item = DVec3> {
-        (0..self.view.hierarchy().mesh().vertices() as u32).filter_map(|v| self.place(v))
+        self.view.vertices().filter_map(|v| self.place(v))
     }
 
     fn triangles(&self) -> impl Iterator<Item = [DVec3; 3]> {
@@ -169,6 +178,18 @@ impl Shown for DrawnPages<'_> {
         let at = |w: u32| self.place(self.view.wedge_vertex(w)).unwrap_or_default();
         corners(self.view.indices(), |s| self.view.face_in(s).is_some()).map(move |f| f.map(at))
     }
+
+    fn visible(&self, frustum: &Frustum, placed: &[DMat4]) -> usize {
+        let held = |p: DVec3| held(frustum, placed, p);
+        // As if none were elsewhere, and then those that are.
+        let mut sum = self.view.visible(frustum, placed);
+        for &(v, at) in self.displaced {
+            if let Some(own) = self.view.position(v) {
+                sum = sum + held(at) - held(own);
+            }
+        }
+        sum
+    }
 }
 
 /// Faces of all meshes, each counted once.
@@ -200,11 +221,7 @@ pub(super) fn visible_vertices<S: Shown>(
     camera: &Camera,
 ) -> usize {
     let frustum = camera.frustum();
-    let seen = |(shown, places): (S, &Vec<DMat4>)| -> usize {
-        let holds = |p: DVec3| places.iter().filter(|m| frustum.contains(m.transform_point3(p))).count();
-        shown.places().map(holds).sum()
-    };
-    all.zip(places).map(seen).sum()
+    all.zip(places).map(|(shown, placed)| shown.visible(&frustum, placed)).sum()
 }
 
 /// The scene as it is shown; at full detail the one that was made progressive, bit for bit.

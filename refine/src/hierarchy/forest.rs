@@ -186,10 +186,16 @@ impl Forest {
         Some((self.firsts.before(k) + u32::from(first) - 1, !first))
     }
 
+    /// Some splits move the vertices that they split.
+    #[inline]
+    pub(crate) fn any_moves(&self) -> bool {
+        !self.moves.none()
+    }
+
     /// Where vertex `v` stands after splits of its chain, the first ones. O(those that do not move it).
     #[inline(always)]
     pub(crate) fn place_after(&self, pm: &ProgressiveMesh, v: u32, applied: Run<'_>) -> DVec3 {
-        if !self.moves.none()
+        if self.any_moves()
             && let Some(j) = applied.iter().rev().find(|&j| self.moves.get(j))
         {
             return pm.moved_positions.get(self.moves.before(j) as usize);

@@ -1,6 +1,7 @@
 //! Chunks of splits as they are held, and the base.
 
 use super::sight::{self, Sight};
+use super::visible::{self, Extent};
 use crate::aif::{NONE, Positions};
 use crate::format::pages::{self, BaseLinks, Links, Lists};
 use crate::format::{Gaps, MeshHead, SplitBlock};
@@ -83,9 +84,11 @@ pub(super) struct Page {
     /// Splits of the closure that is being gathered, a bit each.
     marked: Vec<u64>,
     /// Of which splits the new vertices are in the mesh, a bit each: so that those are found without reading the others.
-    there: Vec<u64>,
+    pub(super) there: Vec<u64>,
     /// Where new vertices stand, if places are double.
     places: Vec<[f64; 3]>,
+    /// About the new vertices of as many splits, and about them all.
+    pub(super) boxes: Vec<Extent>,
     moved_positions: Positions,
     /// Moved vertices before every 64th split.
     moved_before: Vec<u32>,
@@ -224,6 +227,7 @@ impl Page {
             }
         });
         let of = of.collect();
+        let boxes = visible::boxes((0..count).map(|k| block.new_positions.get(k)));
         fn shrink<T>(mut v: Vec<T>) -> Vec<T> {
             v.shrink_to_fit();
             v
@@ -240,6 +244,7 @@ impl Page {
                 Positions::F32(_) => Vec::new(),
                 Positions::F64(p) => shrink(p),
             },
+            boxes,
             moved_positions: fit(block.moved_positions),
             moved_before,
             known,
@@ -324,6 +329,7 @@ impl Page {
             + of(&self.marked)
             + of(&self.there)
             + of(&self.places)
+            + of(&self.boxes)
             + points(&self.moved_positions)
             + of(&self.moved_before)
             + of(&self.known)
@@ -351,7 +357,8 @@ impl Page {
         let others = raw.saturating_sub((18 + point) * count);
         let attributes = 12 * count * (wedges > 0) as u64 + 12 * wedges + others;
         let places = if point > 12 { point * count } else { 0 };
-        let records = (size_of::<Record>() as u64 + 4) * count + count.div_ceil(64) * (4 + 8 + 8);
+        let boxes = size_of::<Extent>() as u64 * (count.div_ceil(visible::EACH as u64) + 1);
+        let records = (size_of::<Record>() as u64 + 4) * count + count.div_ceil(64) * (4 + 8 + 8) + boxes;
         let all = outside + sight::most_bytes(count) + others + attributes + places + records;
         usize::try_from(all).unwrap_or(usize::MAX / 4) + size_of::<Page>() + 64
     }

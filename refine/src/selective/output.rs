@@ -43,7 +43,9 @@ impl View {
     /// Where vertex `v` stands, model units; `None` if it is not shown. Panics if there is no such vertex.
     pub fn position(&self, v: u32) -> Option<DVec3> {
         let h = &*self.hierarchy;
-        self.front.has(v).then(|| h.forest.place(h.mesh(), v, self.front.turns(&h.forest, v)))
+        // Which of its splits are applied is asked only where some move their vertices.
+        let turns = || if h.forest.any_moves() { self.front.turns(&h.forest, v) } else { 0 };
+        self.front.has(v).then(|| h.forest.place(h.mesh(), v, turns()))
     }
 
     /// The attribute values of a wedge, and the channels it has; empty if it is not shown, or without attributes.
