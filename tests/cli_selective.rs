@@ -134,6 +134,16 @@ fn a_flight_reports_every_frame_and_what_is_shown_is_within_the_tolerance() {
     assert!(
         r["frames"].as_array().unwrap().iter().all(|f| number(f, "vsplits") + number(f, "ecols") <= 128.0)
     );
+    // At a display's pace: the same frames, no sooner.
+    let begun = std::time::Instant::now();
+    let paced = p.done("fly in.pm --path circle --frames 4 --fps 30 --json -q").json();
+    assert!(begun.elapsed().as_secs_f64() >= 0.1);
+    let free = p.done("fly in.pm --path circle --frames 4 --json -q").json();
+    assert!(paced["fps"] == 30 && free["fps"].is_null());
+    for (a, b) in paced["frames"].as_array().unwrap().iter().zip(free["frames"].as_array().unwrap()) {
+        assert_eq!((number(a, "faces"), number(a, "vsplits")), (number(b, "faces"), number(b, "vsplits")));
+    }
+    assert_eq!(p.run("fly in.pm --path circle --frames 4 --fps 0").code, 2);
     // For people, and pictures.
     let run = p.done("fly in.pm --path circle --frames 3 --png-every 2 --png-to shots");
     assert!(run.stderr.contains("vertex splits") && run.stdout.is_empty(), "{}", run.stderr);

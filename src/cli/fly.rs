@@ -41,7 +41,7 @@ Examples:
   progmesh fly dragon.ply --path circle --geomorph=time:20 --measure-every 10
   progmesh fly dragon.ply --path circle --html dragon.html --html-taus 1,4
   progmesh fly alps.pm --path lemniscate --grid alps.tif --path-speed fast --measure-every 10
-  progmesh fly alps.pm --path circle --grid alps.tif --cull frustum --memory 256 --measure-every 20
+  progmesh fly alps.pm --path circle --grid alps.tif --cull frustum --memory 256 --fps 60 --measure-every 20
   progmesh fly city.pm --path walk.json --memory 256 --fetches 2 --geomorph --html walk.html
   progmesh fly dragon.ply --path circle --rule truly --measure-every 20
   progmesh fly terrain.obj --path canyon.frames --path-scale 1024 --budget-us 500
@@ -57,6 +57,11 @@ pub(crate) struct Args {
     /// End refining a frame after this many microseconds; the next goes on
     #[arg(long, value_name = "US", value_parser = args::positive, allow_negative_numbers = true, help_heading = "View")]
     budget_us: Option<usize>,
+    /// Begin this many frames a second at most, as a display does [default: each when the one before is done]
+    ///
+    /// What other threads do in between is in no frame's time: with --memory they decode chunks that will be needed.
+    #[arg(long, value_name = "N", value_parser = args::positive, allow_negative_numbers = true, help_heading = "View")]
+    fps: Option<usize>,
     /// Keep what is not needed until it is not needed at this times the tolerance either, 0.1 to 1
     #[arg(long, value_name = "H", value_parser = hysteresis, default_value = "1", allow_negative_numbers = true,
           help_heading = "View")]
@@ -162,6 +167,7 @@ impl Args {
             (report.rule, report.error, report.guard) = (name, rule.error(), guard);
             Ok(report)
         })?;
+        report.fps = self.fps;
         warnings.say(std::mem::take(&mut report.warnings));
         report.warnings = warnings.all;
         if !self.quiet {
@@ -204,6 +210,7 @@ impl Args {
             budget_faces: self.needs.budget_faces,
             budget_us: self.budget_us,
             hysteresis: self.hysteresis,
+            fps: self.fps,
             interrupt,
         }
     }

@@ -78,6 +78,8 @@ struct Fly {
     error: String,
     #[serde(deserialize_with = "present")]
     tau: Option<f64>,
+    #[serde(deserialize_with = "present")]
+    fps: Option<usize>,
     full_faces: usize,
     frame_count: usize,
     faces: FlyStatistics,
@@ -260,7 +262,9 @@ fn selective_commands_print_one_object_with_the_documented_fields() {
     let guards = [t.guard.unwrap(), u.guard.unwrap()];
     assert!(guards.iter().all(|g| g.turned <= t.full_splits && g.deferred + g.through <= 9 * t.full_splits));
     p.done("encode in.obj in.pm --paged -q");
-    let g: Fly = serde_json::from_str(&of("fly in.pm --path circle --frames 2 --memory 32 --json")).unwrap();
+    let g: Fly =
+        serde_json::from_str(&of("fly in.pm --path circle --frames 2 --memory 32 --fps 500 --json")).unwrap();
+    assert_eq!((t.fps, g.fps), (None, Some(500)));
     let paged = g.paging.unwrap();
     assert!(
         paged.most_bytes <= paged.limit_bytes

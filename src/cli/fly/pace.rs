@@ -10,6 +10,7 @@ use glam::DVec3;
 use progmesh::refine::selective::{Cull, Done, Limits, Regulator};
 use progmesh::refine::view::Camera;
 use progmesh::selective::{Ground, Judge};
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 /// How a flight refines.
@@ -20,6 +21,8 @@ pub(super) struct Setting<'a> {
     pub(super) budget_faces: Option<usize>,
     pub(super) budget_us: Option<usize>,
     pub(super) hysteresis: f64,
+    /// Frames a second at most.
+    pub(super) fps: Option<usize>,
     pub(super) interrupt: &'a Interrupt,
 }
 
@@ -27,6 +30,8 @@ pub(super) struct Setting<'a> {
 pub(super) struct Pace<'a> {
     setting: Setting<'a>,
     regulator: Option<Regulator>,
+    /// Before it no frame begins.
+    next: Cell<Option<Instant>>,
 }
 
 /// A frame that has been refined.
@@ -41,7 +46,8 @@ pub(super) struct Timed<T> {
 
 impl<'a> Pace<'a> {
     pub(super) fn new(setting: Setting<'a>) -> Self {
-        Pace { setting, regulator: setting.budget_faces.map(|n| Regulator::new(n, setting.tau)) }
+        let regulator = setting.budget_faces.map(|n| Regulator::new(n, setting.tau));
+        Pace { setting, regulator, next: Cell::new(None) }
     }
 
     /// One frame: `adapt` is given its tolerance, what to cull and its limits, and is timed.
@@ -57,6 +63,7 @@ impl<'a> Pace<'a> {
             return Err(Failure::Interrupted);
         }
         let tau = self.regulator.as_ref().map_or(s.tau, Regulator::tau);
+        self.wait();
         let start = Instant::now();
         let end = s.budget_us.map(|us| start + Duration::from_micros(us as u64));
         let expired = || end.is_some_and(|end| Instant::now() >= end);
@@ -70,6 +77,15 @@ impl<'a> Pace<'a> {
         let us = start.elapsed().as_secs_f64() * 1e6;
         let done = done.map_err(|e| Failure::Input(format!("{file}: {e}")))?;
         Ok(Timed { tau, us, done })
+    }
+
+    /// Until the next frame may begin.
+    fn wait(&self) {
+        let Some(fps) = self.setting.fps else { return };
+        let now = Instant::now();
+        let from = self.next.get().map_or(now, |next| next.max(now));
+        std::thread::sleep(from - now);
+        self.next.set(Some(from + Duration::from_secs_f64(1.0 / fps as f64)));
     }
 
     /// What came of the frame, for the tolerance of the next.
