@@ -264,7 +264,7 @@ fn selective_commands_print_one_object_with_the_documented_fields() {
     p.done("encode in.obj in.pm --paged -q");
     let g: Fly =
         serde_json::from_str(&of("fly in.pm --path circle --frames 2 --memory 32 --fps 500 --json")).unwrap();
-    assert_eq!((t.fps, g.fps), (None, Some(500)));
+    assert_eq!((f.fps, g.fps), (None, Some(500)));
     let paged = g.paging.unwrap();
     assert!(
         paged.most_bytes <= paged.limit_bytes
