@@ -124,6 +124,9 @@ fn start(resume: usize, len: usize) -> (usize, bool) {
     if resume == 0 || resume >= len { (len, true) } else { (resume, false) }
 }
 
+/// In the first frame what this part of the tolerance asks for is made ahead: over generated terrain of 4,097 x 4,097 it then takes a quarter to a third less on two threads. Other parts were not tried.
+const FINER: f64 = 0.8;
+
 /// How gathering a closure ended.
 enum Gathered {
     Whole,
@@ -361,10 +364,13 @@ impl<S: ByteRanges> PagedView<S> {
         }
     }
 
-    /// When to look again at a split that is not needed now: if its page is not there, some frames before it can be needed. If it is then as if it would be, its page is made by another thread.
+    /// When to look again at a split that is not needed now: if its page is not there, some frames before it can be needed. If it is then as if it would be, its page is made by another thread. In the first frame how lenses move is not known: then what a finer tolerance asks for is made, much of which this frame needs anyway.
     fn ahead_of(&mut self, e: &Entry, due: Due) -> Due {
         if !self.shelf.looks_ahead || !self.shelf.is_missing(e.split) {
             return due;
+        }
+        if self.shelf.is_first_frame() && self.clock.wants_at(e, FINER) {
+            self.shelf.wish(e.split, false);
         }
         let (early, soon) = self.clock.ahead_of(due);
         if soon && self.clock.will_want(e) && self.shelf.wish(e.split, false) { due } else { early }

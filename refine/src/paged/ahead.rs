@@ -18,6 +18,10 @@ const PART: usize = 8;
 /// Frames after which a page that was not asked for gives way.
 const STALE: u64 = 64;
 
+/// The first frame, and what stands for it where a page is wished for that may be needed after it: it gives way to any other.
+pub(super) const FIRST: u64 = 1;
+pub(super) const GUESS: u64 = 0;
+
 /// Bytes that other threads can read, too.
 pub(super) type Shared = Arc<dyn ByteRanges + Send + Sync>;
 
@@ -149,11 +153,13 @@ impl Drop for Place {
     }
 }
 
+/// A page that was wished for: its chunk, and the frame of the last wish.
+type Wish = (usize, u64, Arc<Job>);
+
 /// What is made ahead.
 pub(super) struct Ahead {
     line: Option<Arc<Line>>,
-    /// By chunk, and the frame in which each was wished for.
-    jobs: Vec<(usize, u64, Arc<Job>)>,
+    jobs: Vec<Wish>,
     /// Pages that there is room for.
     most: usize,
     /// Bytes set aside.
@@ -223,9 +229,11 @@ impl Ahead {
         }
         if self.jobs.len() >= self.most {
             // What is needed goes before what was foreseen and nobody has begun with.
-            let stale = |j: &(usize, u64, Arc<Job>)| j.1 + STALE < frame && j.2.give_up(true);
-            let foreseen = |j: &(usize, u64, Arc<Job>)| now && j.1 < frame && j.2.give_up(false);
-            let old = self.jobs.iter().position(stale).or_else(|| self.jobs.iter().position(foreseen));
+            let stale = |j: &Wish| j.1 + STALE < frame && j.2.give_up(true);
+            let foreseen = |j: &Wish| now && j.1 < frame && j.2.give_up(false);
+            let guessed = |j: &Wish| j.1 == GUESS && frame > FIRST && j.2.give_up(true);
+            let position = |of: &dyn Fn(&Wish) -> bool| self.jobs.iter().position(of);
+            let old = position(&guessed).or_else(|| position(&stale)).or_else(|| position(&foreseen));
             let Some(old) = old else { return false };
             let (_, _, job) = self.jobs.swap_remove(old);
             line.lock().0.retain(|w| !Arc::ptr_eq(&w.job, &job));
@@ -369,5 +377,29 @@ mod tests {
         pool.install(|| ());
         drop(pool);
         assert_eq!(gate.state.lock().unwrap().0.len(), 20 + AT_ONCE);
+    }
+
+    /// What the first frame guessed gives way to all that later ones foresee, unless somebody is at it.
+    #[test]
+    fn guesses_give_way() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3 * AT_ONCE).build().unwrap();
+        let gate = Arc::new(Gate::default());
+        let (page, each) = (10, 100);
+        let mut ahead = Ahead::new(Some(gate.clone()), PART * (AT_ONCE * each + 20 * page), page, each);
+        let head = Arc::new(MeshHead::default());
+        let wish = |ahead: &mut Ahead, c: usize, frame: u64| {
+            pool.install(|| ahead.wish(c, (frame, false), &head, way(c as u64)))
+        };
+        (0..20).for_each(|c| assert!(wish(&mut ahead, c, GUESS)));
+        gate.wait_for(|s| s.0.len() == AT_ONCE);
+        assert!(!wish(&mut ahead, 20, FIRST));
+        // One is foreseen by now.
+        assert!(wish(&mut ahead, 19, FIRST + 1));
+        let more = 20 - AT_ONCE - 1;
+        (20..20 + more).for_each(|c| assert!(wish(&mut ahead, c, FIRST + 1), "{c}"));
+        assert!(!wish(&mut ahead, 50, FIRST + 1) && ahead.jobs.len() == 20);
+        assert!(ahead.jobs.iter().any(|j| j.0 == 19));
+        gate.open(true);
+        gate.wait_for(|s| s.0.len() == 20 && s.2 == 0);
     }
 }

@@ -1,7 +1,7 @@
 //! Which pages are there; fetching, and letting go.
 
 use super::PagedError;
-use super::ahead::{Ahead, Made};
+use super::ahead::{Ahead, FIRST, GUESS, Made};
 use super::page::{Base, Page, Record, RowRef};
 use super::pool::{APPLIED, Hot, LED, NEEDS, Pool};
 use crate::aif::NONE;
@@ -325,6 +325,11 @@ impl<S: ByteRanges> Shelf<S> {
         self.looks_ahead = self.ahead.works();
     }
 
+    /// This is the first frame: how lenses move is not known.
+    pub(super) fn is_first_frame(&self) -> bool {
+        self.frame == FIRST
+    }
+
     /// The page of split `i` is not there.
     #[inline]
     pub(super) fn is_missing(&self, i: u32) -> bool {
@@ -338,7 +343,8 @@ impl<S: ByteRanges> Shelf<S> {
             return true;
         }
         let Ok(way) = self.way(i, false) else { return false };
-        self.ahead.wish(c, (self.frame, now), &self.head, way)
+        let frame = if !now && self.is_first_frame() { GUESS } else { self.frame };
+        self.ahead.wish(c, (frame, now), &self.head, way)
     }
 
     /// Has pages made ahead that hold what is wanted some frames on, as far as pages that are there tell; a part of these is asked in each frame.

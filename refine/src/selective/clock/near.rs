@@ -180,6 +180,11 @@ impl Clocks {
         self.coming.as_ref().is_some_and(|coming| coming.iter().any(|l| l.wants(e, l.tau)))
     }
 
+    /// A split is needed at a part of the tolerance.
+    pub(crate) fn wants_at(&self, e: &Entry, part: f64) -> bool {
+        self.all.lenses.iter().any(|l| l.wants(e, part * l.tau))
+    }
+
     /// When something that has this slack is to be looked at again.
     #[inline]
     fn due(&self, judges: &Judges<'_>, e: &Entry, slack: f64) -> Due {
