@@ -19,11 +19,13 @@
 
 mod adapt;
 mod ahead;
+mod canvas;
 mod front;
 mod list;
 mod output;
 mod page;
 mod pool;
+mod queue;
 mod ready;
 mod shelf;
 mod sight;
@@ -36,12 +38,14 @@ pub use shelf::Traffic;
 use crate::aif::NONE;
 use crate::format::{ByteRanges, FormatError, RangeReader};
 use crate::hierarchy::{Packed, Rule};
-use crate::progressive::{Damage, Fans};
+use crate::progressive::Damage;
 use crate::selective::{Clocks, Cull, Entry, Followed, Lens, LensError, Motions};
 use crate::view::Camera;
 use glam::{DMat4, DVec3, Vec3};
+use canvas::Drawing;
 use list::{List, PLACE, THERE, grown};
 use pool::Hot;
+use queue::Queue;
 use shelf::Shelf;
 use std::sync::Arc;
 use timed::{CHANGE, MOTION};
@@ -54,6 +58,9 @@ const PART_AHEAD: usize = 4;
 
 /// The part of themselves that arrays grow by at least, so that growing costs little in sum.
 const LEAST_AHEAD: usize = 8;
+
+/// Splits that few frames of a flight need.
+const MANY: usize = 1024;
 
 /// A view that pages its mesh in has failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -86,12 +93,7 @@ pub enum PagedError {
 #[derive(Debug)]
 pub struct PagedView<S> {
     shelf: Shelf<S>,
-    fans: Fans,
-    /// Slots whose corners changed, a bit each.
-    touched: Vec<u64>,
-    touched_wedges: usize,
-    /// The first slot of the split that is being applied.
-    slots: u32,
+    drawing: Drawing,
     /// Vertices, faces and splits of what is drawn.
     vertices: usize,
     faces: usize,
@@ -115,8 +117,8 @@ pub struct PagedView<S> {
     open: List,
     /// Splits that could be undone next, by their records.
     last: List,
-    /// Needed splits, the most urgent on top; empty between frames.
-    queue: std::collections::BinaryHeap<(u16, std::cmp::Reverse<u32>)>,
+    /// Needed splits; empty between frames.
+    queue: Queue,
     closure: Vec<u32>,
     /// Records of splits that were applied and whose nodes have not been looked at.
     made: Vec<u32>,
@@ -131,6 +133,23 @@ pub struct PagedView<S> {
     limit: usize,
 }
 
+/// Does two things: at once if it is much, and there are threads.
+#[cfg(feature = "parallel")]
+fn both(much: bool, a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+    if much {
+        rayon::join(a, b);
+    } else {
+        a();
+        b();
+    }
+}
+
+#[cfg(not(feature = "parallel"))]
+fn both(_: bool, a: impl FnOnce(), b: impl FnOnce()) {
+    a();
+    b();
+}
+
 impl<S: ByteRanges> PagedView<S> {
     /// A view that shows the base of mesh `m`, and holds at most `limit` bytes. Reads the base and what stands beside it.
     ///
@@ -141,10 +160,7 @@ impl<S: ByteRanges> PagedView<S> {
         let clock = Clocks::new(shelf.base.links.diagonal);
         let mut view = PagedView {
             shelf,
-            touched: vec![0; faces.div_ceil(64)],
-            touched_wedges: 0,
-            slots: 0,
-            fans,
+            drawing: Drawing::new(fans),
             vertices,
             faces,
             applied: 0,
@@ -158,7 +174,7 @@ impl<S: ByteRanges> PagedView<S> {
             beside: 0,
             open: List::default(),
             last: List::default(),
-            queue: Default::default(),
+            queue: Queue::default(),
             closure: Vec::new(),
             made: Vec::new(),
             needed: Vec::new(),
@@ -272,11 +288,10 @@ impl<S: ByteRanges> PagedView<S> {
     /// Bytes held: the sum of the capacities of all arrays, but for copies of the last frame's lenses. While a chunk is decoded, a part of the limit that is set aside for that is used as well.
     pub fn bytes(&self) -> usize {
         self.shelf.bytes()
-            + 24 * self.fans.corners.capacity()
-            + 8 * self.touched.capacity()
+            + self.drawing.bytes()
             + self.open.bytes()
             + self.last.bytes()
-            + 8 * self.queue.capacity()
+            + self.queue.bytes()
             + 4 * (self.closure.capacity() + self.made.capacity() + self.needed.capacity())
             + MOTION * self.motions.as_ref().map_or(0, Motions::len)
             + CHANGE * self.ahead
@@ -286,9 +301,8 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// Bytes that grow with the mesh shown, of [`PagedView::bytes`].
     pub fn shown_bytes(&self) -> usize {
-        24 * self.fans.corners.capacity()
+        self.drawing.canvas.bytes()
             + size_of::<Hot>() * self.shelf.pool.of.capacity()
-            + 8 * self.touched.capacity()
             + self.open.bytes()
             + self.last.bytes()
     }
@@ -316,6 +330,11 @@ impl<S: ByteRanges> PagedView<S> {
             Some(_) => {}
         }
         self.begun = true;
+    }
+
+    /// There is room for many more splits without asking for it: what a frame like the last needs finds room in whatever order it comes, but for pages.
+    fn is_roomy(&self) -> bool {
+        self.needed_room(MANY).iter().zip(&self.room()).all(|(n, r)| n <= r)
     }
 
     /// Bytes that are free for what is kept.
@@ -355,13 +374,13 @@ impl<S: ByteRanges> PagedView<S> {
     /// Bytes of growing to room for so many: more in all, and those of the largest array that is there until its new one is filled.
     fn growth(&self, [records, there, open_there]: [usize; 3]) -> usize {
         let (places, slots) = self.places(records);
-        let pool = &self.shelf.pool.of;
+        let (pool, canvas) = (&self.shelf.pool.of, &self.drawing.canvas);
         // One array after the other.
         let of_slots = [
             grown::<Hot>(pool.capacity(), records),
-            grown::<[u32; 3]>(self.fans.corners.capacity(), slots),
-            grown::<[u32; 3]>(self.fans.links.capacity(), slots),
-            grown::<u64>(self.touched.capacity(), slots.div_ceil(64)),
+            grown::<[u32; 3]>(canvas.fans.corners.capacity(), slots),
+            grown::<[u32; 3]>(canvas.fans.links.capacity(), slots),
+            grown::<u64>(canvas.touched.capacity(), slots.div_ceil(64)),
         ];
         let lists = [self.open.growth([places, open_there]), self.last.growth([records, there])];
         let [more, most] =
@@ -381,9 +400,10 @@ impl<S: ByteRanges> PagedView<S> {
         }
         let (places, slots) = self.places(records);
         grow(&mut self.shelf.pool.of, records);
-        grow(&mut self.fans.corners, slots);
-        grow(&mut self.fans.links, slots);
-        grow(&mut self.touched, slots.div_ceil(64));
+        let canvas = &mut self.drawing.canvas;
+        grow(&mut canvas.fans.corners, slots);
+        grow(&mut canvas.fans.links, slots);
+        grow(&mut canvas.touched, slots.div_ceil(64));
         self.open.reserve_to([places, open_there]);
         self.last.reserve_to([records, there]);
     }
@@ -397,6 +417,8 @@ impl<S: ByteRanges> PagedView<S> {
         if fits && beside + moving == 0 {
             return true;
         }
+        // Faces are here to be grown.
+        self.drawing.gather();
         // Those that are too small grow by so many at least.
         let to = |ahead: usize| {
             let mut to = [0; 3];
@@ -448,15 +470,17 @@ impl<S: ByteRanges> PagedView<S> {
         fn shrink<T>(v: &mut Vec<T>, to: usize) {
             v.shrink_to(to);
         }
+        self.drawing.gather();
         let before = self.bytes();
         let some = |n: usize| n + n / LEAST_AHEAD;
         let [_, there, open_there] = self.needed_room(0).map(some);
         let records = some(self.shelf.pool.of.len());
         let (places, slots) = self.places(records);
         shrink(&mut self.shelf.pool.of, records);
-        shrink(&mut self.fans.corners, slots);
-        shrink(&mut self.fans.links, slots);
-        shrink(&mut self.touched, slots.div_ceil(64));
+        let canvas = &mut self.drawing.canvas;
+        shrink(&mut canvas.fans.corners, slots);
+        shrink(&mut canvas.fans.links, slots);
+        shrink(&mut canvas.touched, slots.div_ceil(64));
         self.open.shrink_to([places, open_there]);
         self.last.shrink_to([records, there]);
         before - self.bytes()
@@ -469,14 +493,9 @@ impl<S: ByteRanges> PagedView<S> {
         }
     }
 
-    /// What could come next or be undone of all records has places, and their faces have slots.
+    /// What could come next or be undone of all records has places. Their faces get slots when they are drawn.
     fn extend(&mut self) {
         let records = self.shelf.pool.of.len();
-        let (from, slots) = (self.fans.corners.len(), self.shelf.head.base_faces as usize + 2 * records);
-        self.fans.corners.resize(slots, [0; 3]);
-        self.fans.links.resize(slots, [NONE; 3]);
-        self.touched.resize(slots.div_ceil(64), 0);
-        (from..slots).for_each(|slot| self.touched[slot / 64] |= 1 << (slot % 64));
         self.open.extend_to(self.shelf.base.vertices() + 2 * records);
         self.last.extend_to(records);
     }

@@ -1,15 +1,15 @@
 //! From the mesh of the last frame to that of this one, fetching what it needs.
 
-use super::pool::{APPLIED, LED};
+use super::list::{MANY, Mark};
+use super::pool::{APPLIED, Hot, LED};
 use super::ready::LOT;
 use super::shelf::{AtHand, Fetch};
 use super::timed::CHANGE;
-use super::{PagedError, PagedView};
+use super::{PagedError, PagedView, both};
 use crate::aif::NONE;
 use crate::format::{ByteRanges, CONTRADICTS, FormatError};
 use crate::progressive::Damage;
 use crate::selective::{Clocks, Done, Due, Entry, Judges, Lens, Limits, Looked, Many, Meter};
-use std::cmp::Reverse;
 
 /// How far a frame may go.
 #[derive(Clone, Copy)]
@@ -71,6 +71,8 @@ struct Frame<'a> {
     full: bool,
     /// Both lists were looked through from their ends, not from where the last frame was cut short.
     whole: bool,
+    /// See [`PagedView::adapt_in_waves`].
+    waves: bool,
 }
 
 /// Needed splits whose pages other threads make while one is decoded.
@@ -141,9 +143,38 @@ impl<S: ByteRanges> PagedView<S> {
     /// Errors: damage, the source's. The mesh is sound then, and closed, somewhere on the way.
     pub fn adapt(&mut self, lenses: &[Lens], limits: &PagedLimits<'_>) -> Result<PagedDone, PagedError> {
         let meter = Meter::new(&limits.limits);
-        let mut frame =
-            Frame { meter, fetches: limits.fetches, all: PagedDone::default(), full: false, whole: true };
+        let mut frame = Frame {
+            meter,
+            fetches: limits.fetches,
+            all: PagedDone::default(),
+            full: false,
+            whole: true,
+            waves: false,
+        };
         let first = !self.begun;
+        let result = self.adapt_in(lenses, limits, &mut frame);
+        let drawn = self.finish_drawing();
+        result?;
+        drawn?;
+        if first {
+            self.grow_ahead();
+        }
+        // In waves nothing was noted of what there was no room for.
+        let lost = frame.waves && frame.all.no_room > 0;
+        self.cut = frame.meter.over || !frame.whole || lost;
+        let all = &mut frame.all;
+        all.done = frame.meter.done;
+        let nothing_left = all.done.refused + all.no_room + all.postponed == 0;
+        all.done.complete = !frame.meter.over && frame.whole && nothing_left;
+        Ok(*all)
+    }
+
+    fn adapt_in(
+        &mut self,
+        lenses: &[Lens],
+        limits: &PagedLimits<'_>,
+        frame: &mut Frame<'_>,
+    ) -> Result<(), PagedError> {
         self.set_aside();
         self.shelf.next_frame();
         let judges = Judges::new(lenses, limits.limits.hysteresis);
@@ -157,7 +188,17 @@ impl<S: ByteRanges> PagedView<S> {
             self.shelf.foresee(|e| clock.will_want(e));
         }
         let mut desk = Desk::new(&judges, &self.clock);
-        self.coarsen(&mut desk, all, &mut frame)?;
+        let limits = &frame.meter.limits;
+        let unlimited = limits.faces == usize::MAX
+            && limits.operations == usize::MAX
+            && limits.expired.is_none()
+            && frame.fetches == usize::MAX;
+        // In the first frame it shows how much is needed.
+        if unlimited && !all && self.motions.is_none() && self.is_roomy() {
+            frame.waves = true;
+            return self.adapt_in_waves(&mut desk, frame);
+        }
+        self.coarsen(&mut desk, all, frame)?;
         // Once more without what lingers, if it takes the room.
         for attempt in 0..2 {
             if frame.meter.over || (attempt > 0 && (frame.all.no_room == 0 || !self.make_way()?)) {
@@ -165,19 +206,76 @@ impl<S: ByteRanges> PagedView<S> {
             }
             frame.all.no_room = 0;
             frame.full = false;
-            let result = self.refine(&mut desk, all, &mut frame);
-            self.queue.clear();
+            let result = self.refine(&mut desk, all, frame);
+            self.queue.begin(false);
             result?;
         }
-        if first {
-            self.grow_ahead();
+        Ok(())
+    }
+
+    /// Without limits, and with room for what comes, it does not matter what comes first: then both lists are looked through at once, by two threads, before anything is undone, and what is needed is applied in waves.
+    fn adapt_in_waves(
+        &mut self,
+        desk: &mut Desk<'_>,
+        frame: &mut Frame<'_>,
+    ) -> Result<(), PagedError> {
+        self.look_at_both(desk);
+        let (mut lot, mut freed) = (Vec::with_capacity(2 * LOT), Vec::new());
+        let mut k = 0;
+        while self.last.marked(k).is_some() {
+            lot.clear();
+            while lot.len() < LOT && let Some((place, _)) = self.last.marked(k) {
+                lot.push(place);
+                k += 1;
+            }
+            self.undo_lot(&lot, &mut freed, frame)?;
         }
-        self.cut = frame.meter.over || !frame.whole;
-        let all = &mut frame.all;
-        all.done = frame.meter.done;
-        let nothing_left = all.done.refused + all.no_room + all.postponed == 0;
-        all.done.complete = !frame.meter.over && frame.whole && nothing_left;
-        Ok(*all)
+        while !freed.is_empty() {
+            self.undo_freed(desk, &mut freed, &mut lot, frame)?;
+        }
+        self.queue.begin(true);
+        let mut k = 0;
+        while let Some((place, mark)) = self.open.marked(k) {
+            k += 1;
+            // What it would replace may have been undone.
+            let Some(&e) = self.open.get(place) else { continue };
+            match mark {
+                Mark::Now => self.enqueue(0, e.split, frame),
+                Mark::Later => {
+                    let due = self.ahead_of(&e, self.open.due(place));
+                    self.open.set_due(place, due);
+                }
+            }
+        }
+        self.resume = [0; 2];
+        let applied = self.apply_queue(desk, frame);
+        self.queue.begin(false);
+        applied
+    }
+
+    /// Looks at what is due in both lists, at once if there are threads. What is not needed is marked in the one; in the other what is, and whose pages are not there for later.
+    fn look_at_both(&mut self, desk: &Desk<'_>) {
+        let (clock, is_missing) = (&self.clock, self.shelf.missing());
+        let (last, open) = (&mut self.last, &mut self.open);
+        let many = last.were_due() + open.were_due() >= MANY;
+        let (to_keep, to_apply) = (&desk.last, &desk.next);
+        let looks_ahead = self.shelf.looks_ahead;
+        let of_last = || {
+            last.begin(false, clock);
+            last.look((clock, to_keep), |_, wanted, due| match wanted {
+                true => (None, due),
+                false => (Some(Mark::Now), Due::NOW),
+            });
+        };
+        let of_open = || {
+            open.begin(false, clock);
+            open.look((clock, to_apply), |e, wanted, due| match wanted {
+                true => (Some(Mark::Now), Due::NOW),
+                false if looks_ahead && is_missing(e.split) => (Some(Mark::Later), due),
+                false => (None, due),
+            });
+        };
+        both(many, of_last, of_open);
     }
 
     /// Undoes what is not needed, until nothing is left that could be. A lot at a time is looked at, and undone.
@@ -292,6 +390,7 @@ impl<S: ByteRanges> PagedView<S> {
     }
 
     fn refine(&mut self, desk: &mut Desk<'_>, all: bool, frame: &mut Frame<'_>) -> Result<(), PagedError> {
+        self.queue.begin(false);
         let (mut at, whole) = start(self.resume[1], self.open.begin(all, &self.clock));
         while at > 0 && !frame.meter.over {
             at = self.take_due(Which::Open, at, desk, frame);
@@ -299,27 +398,26 @@ impl<S: ByteRanges> PagedView<S> {
         }
         self.resume[1] = at;
         frame.whole &= whole;
-        let limits = &frame.meter.limits;
-        let unlimited = limits.faces == usize::MAX
-            && limits.operations == usize::MAX
-            && limits.expired.is_none()
-            && frame.fetches == usize::MAX;
+        self.apply_queue(desk, frame)
+    }
+
+    /// Applies what is needed, and what that brings.
+    fn apply_queue(&mut self, desk: &mut Desk<'_>, frame: &mut Frame<'_>) -> Result<(), PagedError> {
         let mut lot = Vec::with_capacity(LOT);
-        while let Some(&(rank, _)) = self.queue.peek() {
-            // A lot; of one rank, where a limit of the frame makes it matter which come first. (Of memory: by lots.)
+        while self.queue.len() > 0 {
+            // A lot; of one rank, as a limit of the frame may make it matter which come first. (Of memory: by lots.)
             lot.clear();
+            let rank = self.queue.rank();
             while lot.len() < LOT
-                && let Some(&(r, Reverse(i))) = self.queue.peek()
-                && (r == rank || unlimited)
+                && let Some(i) = self.queue.pop(rank)
             {
-                self.queue.pop();
                 if !self.shelf.is_led(i) {
                     lot.push(i);
                 }
             }
-            if self.shelf.looks_ahead {
+            if self.shelf.looks_ahead && !self.queue.in_waves() {
                 // Those on top of the queue come next.
-                let next = self.queue.iter().take(IN_SIGHT).map(|q| q.1.0);
+                let next = self.queue.next(IN_SIGHT);
                 lot.iter().copied().chain(next).for_each(|i| _ = self.shelf.wish(i, true));
             }
             let at_hand = self.ready_to_apply(&lot);
@@ -333,6 +431,7 @@ impl<S: ByteRanges> PagedView<S> {
                 // Nor is anything fetched for it then.
                 if frame.meter.is_full(self.led_faces) {
                     frame.meter.done.refused += lot.len() - k + self.queue.len();
+                    self.look_at_made(desk, frame);
                     return Ok(());
                 }
                 let alone = match at {
@@ -356,9 +455,14 @@ impl<S: ByteRanges> PagedView<S> {
         self.clock.look(&desk.next, &desk.entries, &mut desk.looked);
         for ((&place, e), (wanted, due)) in desk.places.iter().zip(&desk.entries).zip(desk.looked.each()) {
             // Until it is applied.
-            let due = if wanted { Due::NOW } else { self.ahead_of(e, due) };
-            self.open.set_due(place, due);
-            if wanted {
+            if !wanted {
+                let due = self.ahead_of(e, due);
+                self.open.set_due(place, due);
+            } else if self.queue.in_waves() {
+                self.open.hold(place);
+                self.enqueue(0, e.split, frame);
+            } else {
+                self.open.set_due(place, Due::NOW);
                 self.enqueue(desk.judges.rank(e), e.split, frame);
             }
         }
@@ -398,9 +502,7 @@ impl<S: ByteRanges> PagedView<S> {
             }
             self.clock.look(&desk.last, &desk.entries, &mut desk.looked);
             for (&place, (wanted, due)) in desk.places.iter().zip(desk.looked.each()) {
-                if wanted {
-                    self.last.set_due(place, due);
-                }
+                self.last.set_due(place, if wanted { due } else { Due::NOW });
             }
         }
         self.made = made;
@@ -441,6 +543,7 @@ impl<S: ByteRanges> PagedView<S> {
             frame.meter.done.refused += 1;
             return Ok(());
         }
+        self.see_drawing()?;
         if !self.reserve(closure.len()) {
             frame.full = true;
             frame.all.no_room += 1;
@@ -461,15 +564,15 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// Notes that a split is needed.
     fn enqueue(&mut self, rank: u16, split: u32, frame: &mut Frame<'_>) {
-        if self.queue.len() == self.queue.capacity() {
-            let more = self.queue.capacity() / 2 + 256;
-            if !self.make_room(8 * (self.queue.capacity() + more)) {
-                frame.all.no_room += 1;
-                return;
-            }
-            self.queue.reserve_exact(more);
+        let more = self.queue.growth();
+        if more > 0 && !self.make_room(more) {
+            frame.all.no_room += 1;
+            return;
         }
-        self.queue.push((rank, Reverse(split)));
+        self.queue.push(rank, split);
+        if self.queue.in_waves() && self.shelf.looks_ahead && self.shelf.is_missing(split) {
+            self.shelf.wish(split, true);
+        }
     }
 
     /// Gathers split `i` and all it depends on that is not applied, and fetches their pages.
@@ -582,6 +685,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         let Some(page) = self.shelf.use_page(at) else { return Ok(false) };
         let more = 1 + page.of.get(at.k as usize).is_some_and(|r| r.code.two_faces()) as usize;
+        self.see_drawing()?;
         if self.led_faces + more > frame.meter.limits.faces || !self.reserve(1) {
             return Ok(false);
         }
@@ -594,6 +698,16 @@ impl<S: ByteRanges> PagedView<S> {
     /// No longer asks for the split of a record, on which nothing that is depends; appends to `freed` what can be undone then.
     fn undo(&mut self, h: u32, freed: &mut Vec<u32>) -> Result<(), PagedError> {
         let hot = *self.shelf.pool.get(h).ok_or(Damage::Fan(h as usize))?;
+        if self.motions.is_none() {
+            self.unsplit_faces(h)?;
+        } else if !self.at_once && !self.make_room(CHANGE) {
+            self.jump();
+        }
+        self.withdraw(h, &hot, freed)
+    }
+
+    /// What is asked for no longer can be asked for again, what comes after it cannot.
+    fn withdraw(&mut self, h: u32, hot: &Hot, freed: &mut Vec<u32>) -> Result<(), PagedError> {
         let mut needs = std::mem::take(&mut self.needed);
         self.shelf.needs_of_hot(h, &mut needs)?;
         let place = self.shelf.open_place_of(hot.needs[0], hot.parent);
@@ -601,11 +715,6 @@ impl<S: ByteRanges> PagedView<S> {
         self.open.take_out(first);
         self.open.take_out(first + 1);
         self.last.take_out(h);
-        if self.motions.is_none() {
-            self.unsplit_faces(h)?;
-        } else if !self.at_once && !self.make_room(CHANGE) {
-            self.jump();
-        }
         self.lead(h, &needs, false, |d| freed.push(d));
         self.needed = needs;
         self.open.put_back(place);
@@ -613,5 +722,13 @@ impl<S: ByteRanges> PagedView<S> {
             self.shelf.go(h);
         }
         Ok(())
+    }
+
+    /// Takes back that the split of a record was asked for, which was not drawn; the last of all that were.
+    pub(super) fn take_back(&mut self, h: u32) -> Result<(), PagedError> {
+        let hot = *self.shelf.pool.get(h).ok_or(Damage::Fan(h as usize))?;
+        self.leave(h, &hot);
+        let mut freed = Vec::new();
+        self.withdraw(h, &hot, &mut freed)
     }
 }

@@ -1,5 +1,6 @@
 //! A split and its undoing on the faces shown, with what stands in pages.
 
+use super::canvas::Stroke;
 use super::page::RowRef;
 use super::pool::{APPLIED, Hot, LED};
 use super::{PagedError, PagedView};
@@ -47,9 +48,15 @@ impl<S: ByteRanges> PagedView<S> {
         Ok(slot << 2 | cut & 3)
     }
 
+    /// Splits are drawn by strokes: nothing but faces takes part.
+    #[inline]
+    pub(super) fn draws_by_strokes(&self) -> bool {
+        self.motions.is_none() && self.shelf.head.channels.is_none()
+    }
+
     /// Applies the split of a record, whose dependencies are applied. O(valence).
     ///
-    /// Errors: damage; nothing has changed then.
+    /// Errors: damage; nothing has changed then. Of one that is drawn by a stroke it may come later: see [`PagedView::finish_drawing`].
     pub(super) fn split_faces(&mut self, h: u32) -> Result<(), PagedError> {
         let hot = *self.shelf.pool.get(h).ok_or(Damage::Fan(h as usize))?;
         let (i, at) = (hot.split, hot.split as usize);
@@ -62,19 +69,26 @@ impl<S: ByteRanges> PagedView<S> {
         }
         let right = if s.code.two_faces() { self.cut(i, right, hot.needs[2])? } else { NONE };
         let cuts = (self.cut(i, left, hot.needs[1])?, right);
-        self.slots = self.shelf.first_slot(h);
-        if self.motions.is_some() {
-            let mut needs = std::mem::take(&mut self.needed);
-            self.shelf.needs_of_hot(h, &mut needs)?;
-            self.can_count(i, &needs, APPLIED, |r| r.holders)?;
-            split(self, &s, cuts, &explicit)?;
-            for &d in &needs {
-                self.shelf.pool.get_mut(d).into_iter().for_each(|d| d.holders += 1);
-            }
-            self.needed = needs;
-            self.pending -= usize::from(hot.flags & LED != 0);
+        let first = self.shelf.first_slot(h);
+        if self.draws_by_strokes() && s.code.kind() != SplitKind::Explicit {
+            self.drawing.put(h, stroke(&s, first, [cuts.0, cuts.1], true));
         } else {
-            split(self, &s, cuts, &explicit)?;
+            self.finish_drawing()?;
+            self.drawing.canvas.extend_to(first as usize + 2);
+            self.drawing.canvas.slots = first;
+            if self.motions.is_some() {
+                let mut needs = std::mem::take(&mut self.needed);
+                self.shelf.needs_of_hot(h, &mut needs)?;
+                self.can_count(i, &needs, APPLIED, |r| r.holders)?;
+                split(self, &s, cuts, &explicit)?;
+                for &d in &needs {
+                    self.shelf.pool.get_mut(d).into_iter().for_each(|d| d.holders += 1);
+                }
+                self.needed = needs;
+                self.pending -= usize::from(hot.flags & LED != 0);
+            } else {
+                split(self, &s, cuts, &explicit)?;
+            }
         }
         let old = self.shelf.head.base_vertices + 2 * i;
         self.shelf.set_node_of(s.vertex, hot.maker, old);
@@ -89,6 +103,26 @@ impl<S: ByteRanges> PagedView<S> {
         self.faces += 1 + s.code.two_faces() as usize;
         self.applied += 1;
         Ok(())
+    }
+
+    /// From time to time finishes drawing, so that what is remembered of it does not grow.
+    #[inline]
+    pub(super) fn see_drawing(&mut self) -> Result<(), PagedError> {
+        if self.drawing.is_full() { self.finish_drawing() } else { Ok(()) }
+    }
+
+    /// Draws what is not drawn yet. What turns out to contradict the faces, and all that was asked for after it, is taken back.
+    ///
+    /// Errors: damage. The mesh is sound then, and closed: that of the splits before.
+    pub(super) fn finish_drawing(&mut self) -> Result<(), PagedError> {
+        if self.drawing.is_done() {
+            return Ok(());
+        }
+        let Err((damage, lost)) = self.drawing.finish() else { return Ok(()) };
+        for h in lost {
+            self.take_back(h)?;
+        }
+        Err(damage.into())
     }
 
     /// What split `i` depends on, by these records, has these flags and can have one more that depends on it. Honest meshes have few: what a hostile file says of more is damage.
@@ -132,7 +166,7 @@ impl<S: ByteRanges> PagedView<S> {
             } else {
                 r.dependents -= 1;
                 if r.dependents == 0 && r.flags & LED != 0 {
-                    self.last.put_back(d);
+                    self.last.hold(d);
                     freed(d);
                 }
             }
@@ -158,16 +192,28 @@ impl<S: ByteRanges> PagedView<S> {
         if hot.flags & APPLIED == 0 {
             return Err(Damage::Fan(hot.split as usize).into());
         }
-        if self.motions.is_some() {
-            let mut needs = std::mem::take(&mut self.needed);
-            self.shelf.needs_of_hot(h, &mut needs)?;
-            for &d in &needs {
-                self.shelf.pool.get_mut(d).into_iter().for_each(|d| d.holders -= 1);
+        if self.draws_by_strokes() && s.code.kind() != SplitKind::Explicit {
+            let right = if s.code.two_faces() { first + 1 << 2 } else { NONE };
+            self.drawing.put(h, stroke(&s, first, [first << 2, right], false));
+        } else {
+            self.finish_drawing()?;
+            if self.motions.is_some() {
+                let mut needs = std::mem::take(&mut self.needed);
+                self.shelf.needs_of_hot(h, &mut needs)?;
+                for &d in &needs {
+                    self.shelf.pool.get_mut(d).into_iter().for_each(|d| d.holders -= 1);
+                }
+                self.needed = needs;
             }
-            self.needed = needs;
+            unsplit(self, &s, [first, first + s.code.two_faces() as u32], &explicit);
         }
-        unsplit(self, &s, [first, first + s.code.two_faces() as u32], &explicit);
-        self.shelf.set_node_of(s.vertex, hot.maker, hot.parent);
+        self.leave(h, &hot);
+        Ok(())
+    }
+
+    /// Of a split that is not drawn any more: its vertex is at the node before, its new one is not there.
+    pub(super) fn leave(&mut self, h: u32, hot: &Hot) {
+        self.shelf.set_node_of(hot.vertex, hot.maker, hot.parent);
         if let Some(r) = self.shelf.pool.get_mut(h) {
             r.node = NONE;
             r.flags &= !APPLIED;
@@ -178,19 +224,25 @@ impl<S: ByteRanges> PagedView<S> {
             p.stamp = clock;
         }
         self.vertices -= 1;
-        self.faces -= 1 + s.code.two_faces() as usize;
+        self.faces -= 1 + hot.code.two_faces() as usize;
         self.applied -= 1;
-        Ok(())
     }
+
+}
+
+/// The stroke of a split with its first slot.
+fn stroke(of: &Known, first: u32, cuts: [u32; 2], on: bool) -> Stroke {
+    let &Known { split, vertex, new_vertex, code, .. } = of;
+    Stroke { split, vertex, new_vertex, first, cuts, code, on }
 }
 
 impl<S: ByteRanges> Sheet for PagedView<S> {
     fn fans(&self) -> &Fans {
-        &self.fans
+        &self.drawing.canvas.fans
     }
 
     fn fans_mut(&mut self) -> &mut Fans {
-        &mut self.fans
+        &mut self.drawing.canvas.fans
     }
 
     fn has_rows(&self) -> bool {
@@ -229,21 +281,21 @@ impl<S: ByteRanges> Sheet for PagedView<S> {
         self.shelf.set_wedge_row(w, RowRef::NOTHING);
     }
 
-    fn take_slots(&mut self, _: &Known) -> [u32; 2] {
-        [self.slots, self.slots + 1]
+    fn take_slots(&mut self, of: &Known) -> [u32; 2] {
+        self.drawing.canvas.take_slots(of)
     }
 
     fn leave_slots(&mut self, _: &Known, _: [u32; 2]) {}
 
     fn touch(&mut self, slot: u32) {
-        self.touched[slot as usize / 64] |= 1 << (slot % 64);
+        self.drawing.canvas.touch_slot(slot);
     }
 
     fn touch_wedge(&mut self, _: u32) {
-        self.touched_wedges += 1;
+        self.drawing.canvas.touched_wedges += 1;
     }
 
     fn touch_vertex(&mut self, _: u32, _: Half) {
-        self.touched_wedges += 1;
+        self.drawing.canvas.touched_wedges += 1;
     }
 }

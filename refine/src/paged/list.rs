@@ -3,7 +3,9 @@
 //! Entries have places that are told by what they are of, and stay there while they are not to be asked: so nothing is moved, or looked for. Few frames ask all times. From time to time all are, for those that
 //! may come before a *horizon*, some frames like the last from now; until lenses have passed that, frames ask these alone. Of these in turn, those before a nearer horizon are asked in every frame and the others in few.
 
-use crate::selective::{Clocks, Due, Entry, Sums};
+use super::both;
+use super::ready::LOT;
+use crate::selective::{Clocks, Due, Entry, Looked, Many, Sums};
 
 /// Frames to the horizon, at most.
 const FRAMES: f64 = 32.0;
@@ -27,6 +29,23 @@ fn near_of(there: usize) -> usize {
     there.div_ceil(4)
 }
 
+/// What is to be done about something that was looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mark {
+    /// In this frame.
+    Now,
+    /// When its page is there.
+    Later,
+}
+
+/// The bit of [`Mark::Later`]: places are as many as nodes, which are fewer.
+const LATER: u32 = 1 << 31;
+
+/// Places that are looked at before what came of it is noted.
+const BLOCK: usize = 4096;
+/// So many are looked at by two threads: to wake one takes as long as some hundred looks.
+pub(super) const MANY: usize = 1024;
+
 /// A list without order, by places.
 #[derive(Debug, Default)]
 pub(super) struct List {
@@ -41,6 +60,8 @@ pub(super) struct List {
     near_horizon: Option<Sums>,
     /// Places that are due in this frame, ascending; some may have been taken out since.
     ready: Vec<u32>,
+    /// So many were due.
+    were_due: usize,
     /// A bit for every place, all 0: to sort with.
     sorting: Vec<u64>,
 }
@@ -106,6 +127,11 @@ impl List {
         }
     }
 
+    /// When what is in a place is due.
+    pub(super) fn due(&self, at: u32) -> Due {
+        self.due.get(at as usize).copied().unwrap_or(Due::NEVER)
+    }
+
     /// Something is in a place.
     #[inline]
     pub(super) fn has(&self, at: u32) -> bool {
@@ -124,13 +150,18 @@ impl List {
         self.of.get(at as usize)
     }
 
-    /// Puts an entry, which is to be looked at at once, into a place.
+    /// Puts an entry into a place. It is looked at in this frame: [`List::set_due`] is called for it, or [`List::begin`] told to ask all.
     #[inline]
     pub(super) fn put(&mut self, at: u32, entry: Entry) {
-        if let Some(e) = self.of.get_mut(at as usize) {
-            *e = entry;
-            self.set_due(at, Due::NOW);
+        if let (Some(e), Some(d)) = (self.of.get_mut(at as usize), self.due.get_mut(at as usize)) {
+            (*e, *d) = (entry, Due::NOW);
         }
+    }
+
+    /// What is in a place, or was taken out of it, is there and dealt with in this frame, as what is put there is.
+    #[inline]
+    pub(super) fn hold(&mut self, at: u32) {
+        self.due.get_mut(at as usize).into_iter().for_each(|d| *d = Due::NOW);
     }
 
     /// What was taken out of a place is there again, and to be looked at at once.
@@ -256,6 +287,65 @@ impl List {
         }
     }
 
+    /// Looks at all that is due. `sort` is told of each whether it is needed, or to be kept, and when that is to be looked at again; what it answers with a mark stays among what is due, the others leave.
+    pub(super) fn look(
+        &mut self,
+        ask: (&Clocks, &Many<'_>),
+        sort: impl Fn(&Entry, bool, Due) -> (Option<Mark>, Due),
+    ) {
+        let mut told = vec![(false, Due::NEVER); self.ready.len().min(BLOCK)];
+        self.were_due = self.ready.len();
+        let (mut from, mut kept) = (0, 0);
+        while from < self.ready.len() {
+            let to = (from + BLOCK).min(self.ready.len());
+            let (places, told) = (&self.ready[from..to], &mut told[..to - from]);
+            let half = places.len() / 2 / LOT * LOT;
+            let (first, second) = told.split_at_mut(half);
+            both(
+                places.len() >= MANY,
+                || self.look_at(ask, &places[..half], first),
+                || self.look_at(ask, &places[half..], second),
+            );
+            for (k, &(wanted, due)) in (from..to).zip(&*told) {
+                let at = self.ready[k];
+                let Some(e) = self.get(at) else { continue };
+                let (mark, due) = sort(e, wanted, due);
+                match mark {
+                    Some(Mark::Now) => self.hold(at),
+                    _ => self.set_due(at, due),
+                }
+                if let Some(mark) = mark {
+                    self.ready[kept] = at | if mark == Mark::Later { LATER } else { 0 };
+                    kept += 1;
+                }
+            }
+            from = to;
+        }
+        self.ready.truncate(kept);
+    }
+
+    /// Looks at what is in places, a lot at a time.
+    fn look_at(&self, (clock, many): (&Clocks, &Many<'_>), places: &[u32], told: &mut [(bool, Due)]) {
+        let (mut looked, mut entries) = (Looked::default(), Vec::with_capacity(LOT));
+        for (places, told) in places.chunks(LOT).zip(told.chunks_mut(LOT)) {
+            entries.clear();
+            entries.extend(places.iter().map(|&at| self.of[at as usize]));
+            clock.look(many, &entries, &mut looked);
+            told.iter_mut().zip(looked.each()).for_each(|(t, l)| *t = l);
+        }
+    }
+
+    /// How many were due when that was found out last.
+    pub(super) fn were_due(&self) -> usize {
+        self.were_due
+    }
+
+    /// What has stayed after [`List::look`].
+    pub(super) fn marked(&self, k: usize) -> Option<(u32, Mark)> {
+        let at = *self.ready.get(k)?;
+        Some((at & !LATER, if at & LATER != 0 { Mark::Later } else { Mark::Now }))
+    }
+
     /// Place `k` of those that are due, and what is there; `None` if it was taken out.
     #[inline]
     pub(super) fn ready(&self, k: usize) -> Option<(u32, &Entry)> {
@@ -268,7 +358,7 @@ impl List {
 mod tests {
     use super::*;
     use crate::hierarchy::{Packed, pack_up};
-    use crate::selective::{Cull, Judges, Lens, Looked};
+    use crate::selective::{Cull, Judges, Lens};
     use crate::view::{Camera, CameraParameters, Projection};
     use glam::{DMat4, DVec3};
     use std::collections::{BTreeMap, BTreeSet};
@@ -359,6 +449,7 @@ mod tests {
                     list.put_back(place);
                 } else {
                     list.put(place, entry(splits, vector()));
+                    list.set_due(place, Due::NOW);
                     assert_eq!(list.get(place).map(|e| e.split), Some(splits));
                 }
                 assert!(list.has(place) && told.insert(place, Due::NOW).is_none());

@@ -13,12 +13,12 @@ use std::ops::Range;
 impl<S: ByteRanges> PagedView<S> {
     /// The index buffer: three wedges a slot. A slot without a face has three equal corners. Wedges are numbered as those of the progressive mesh at full detail.
     pub fn indices(&self) -> &[[u32; 3]] {
-        &self.fans.corners
+        &self.drawing.canvas.fans.corners
     }
 
     /// The face of the progressive mesh in a slot of the index buffer; none in one that is free, or is not there.
     pub fn face_in(&self, slot: usize) -> Option<u32> {
-        let slot = u32::try_from(slot).ok().filter(|&s| (s as usize) < self.fans.corners.len())?;
+        let slot = u32::try_from(slot).ok().filter(|&s| (s as usize) < self.drawing.canvas.fans.corners.len())?;
         let Some(k) = slot.checked_sub(self.shelf.head.base_faces) else { return Some(slot) };
         let h = self.shelf.pool.get(k / 2).filter(|h| h.flags & APPLIED != 0)?;
         (k % 2 == 0 || h.code.two_faces()).then(|| self.shelf.head.first_face(h.split) + k % 2)
@@ -26,7 +26,7 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// The slots of the faces across the three edges of the face in a slot; `None` at borders, at edges of three and more faces, and where there is no face.
     pub fn neighbours(&self, slot: usize) -> [Option<usize>; 3] {
-        let links = self.fans.links.get(slot).copied().unwrap_or([NONE; 3]);
+        let links = self.drawing.canvas.fans.links.get(slot).copied().unwrap_or([NONE; 3]);
         links.map(|l| Some((l >> 3) as usize).filter(|_| l != NONE))
     }
 
@@ -60,7 +60,8 @@ impl<S: ByteRanges> PagedView<S> {
     /// Runs of slots of the index buffer that changed since this was last called, ascending (a few unchanged ones between two may be in), and how many wedges are new or
     /// have other values, at most.
     pub fn take_changes(&mut self) -> (Vec<Range<usize>>, usize) {
-        (take_runs(&mut self.touched), std::mem::take(&mut self.touched_wedges))
+        let canvas = &mut self.drawing.canvas;
+        (take_runs(&mut canvas.touched), std::mem::take(&mut canvas.touched_wedges))
     }
 
     /// The faces shown as triangle strips over the wedges of [`PagedView::indices`]. Takes memory of its own beside the limit. O(faces shown).
@@ -98,9 +99,9 @@ impl<S: ByteRanges> PagedView<S> {
             number.insert(v, number.len() as u32);
         }
         let mut slots: Vec<(u32, u32)> =
-            (0..self.fans.corners.len()).filter_map(|s| Some((self.face_in(s)?, s as u32))).collect();
+            (0..self.drawing.canvas.fans.corners.len()).filter_map(|s| Some((self.face_in(s)?, s as u32))).collect();
         slots.sort_unstable();
-        let corners = || slots.iter().flat_map(|&(_, s)| self.fans.corners[s as usize]);
+        let corners = || slots.iter().flat_map(|&(_, s)| self.drawing.canvas.fans.corners[s as usize]);
         let of = |v: u32| number.get(&v).copied().unwrap_or(0);
         out.corners = corners().map(|w| of(self.shelf.wedge_vertex(w))).collect();
         if self.shelf.head.materials {

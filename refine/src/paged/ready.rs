@@ -9,18 +9,18 @@ use crate::format::ByteRanges;
 pub(super) const LOT: usize = 32;
 
 /// Places in memory to be read one right after the other: then the processor asks for the next ones while it waits.
-struct Reads<'a> {
+pub(super) struct Reads<'a> {
     of: [&'a u32; 2 * LOT],
     n: usize,
 }
 
 impl<'a> Reads<'a> {
-    fn new() -> Self {
+    pub(super) fn new() -> Self {
         Reads { of: [&NONE; 2 * LOT], n: 0 }
     }
 
     #[inline]
-    fn ask(&mut self, at: &'a u32) {
+    pub(super) fn ask(&mut self, at: &'a u32) {
         self.of[self.n] = at;
         self.n += 1;
         if self.n == self.of.len() {
@@ -29,7 +29,7 @@ impl<'a> Reads<'a> {
     }
 
     #[inline]
-    fn wait(&mut self) {
+    pub(super) fn wait(&mut self) {
         std::hint::black_box(self.of[..self.n].iter().fold(0, |sum, x| sum ^ **x));
         self.n = 0;
     }
@@ -55,7 +55,9 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// What applying these takes; `tell` is told what they depend on and is not asked for.
     fn read_around(&self, lot: &[u32], mut tell: impl FnMut(u32)) -> [Option<AtHand>; LOT] {
-        let shelf = &self.shelf;
+        let (shelf, canvas) = (&self.shelf, &self.drawing.canvas);
+        // Faces are read when strokes are drawn.
+        let by_strokes = self.draws_by_strokes();
         let mut reads = Reads::new();
         let mut of = [None; LOT];
         for (of, &i) in of.iter_mut().zip(lot) {
@@ -94,6 +96,10 @@ impl<S: ByteRanges> PagedView<S> {
             }
             let place = shelf.open_place_of(at.needs[0], r.parent);
             self.open.last_at(place).iter().for_each(|e| reads.ask(&e.split));
+            *at_hand = Some(at);
+            if by_strokes {
+                continue;
+            }
             for ((slot, &h), cut) in slots.iter_mut().zip(&at.needs[1..]).zip([r.left, r.right]) {
                 let (maker, side) = shelf.half_of_cut(cut);
                 *slot = match (maker, h) {
@@ -102,12 +108,14 @@ impl<S: ByteRanges> PagedView<S> {
                     _ => shelf.first_slot(h) + side as u32,
                 };
             }
-            self.ask_for_faces(slots.iter().copied(), &mut reads);
-            *at_hand = Some(at);
+            canvas.ask_for_faces(slots.iter().copied(), &mut reads);
         }
         reads.wait();
+        if by_strokes {
+            return at_hand;
+        }
         for slots in &slots[..lot.len().min(LOT)] {
-            slots.iter().for_each(|&s| self.ask_for_faces(self.across(s), &mut reads));
+            slots.iter().for_each(|&s| canvas.ask_for_faces(canvas.across(s), &mut reads));
         }
         reads.wait();
         at_hand
@@ -115,12 +123,15 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// Before splits, [`LOT`] records at most, are undone.
     pub(super) fn ready_to_undo(&self, lot: &[u32]) {
-        let shelf = &self.shelf;
+        let (shelf, canvas) = (&self.shelf, &self.drawing.canvas);
+        let by_strokes = self.draws_by_strokes();
         let mut reads = Reads::new();
         for &h in lot {
             shelf.pool.of.get(h as usize).iter().for_each(|r| reads.ask(&r.split));
-            let first = shelf.first_slot(h);
-            self.ask_for_faces([first, first + 1].into_iter(), &mut reads);
+            if !by_strokes {
+                let first = shelf.first_slot(h);
+                canvas.ask_for_faces([first, first + 1].into_iter(), &mut reads);
+            }
         }
         reads.wait();
         for &h in lot {
@@ -128,26 +139,11 @@ impl<S: ByteRanges> PagedView<S> {
             for &d in r.needs.iter().chain([&r.maker]) {
                 shelf.pool.of.get(d as usize).iter().for_each(|r| reads.ask(&r.split));
             }
-            let first = shelf.first_slot(h);
-            self.ask_for_faces(self.across(first).chain(self.across(first + 1)), &mut reads);
-        }
-        reads.wait();
-    }
-
-    /// The slots of the faces across the edges of the one in a slot.
-    #[inline]
-    fn across(&self, slot: u32) -> impl Iterator<Item = u32> {
-        let links = self.fans.links.get(slot as usize).copied().unwrap_or([NONE; 3]);
-        links.into_iter().map(|l| l >> 3)
-    }
-
-    #[inline]
-    fn ask_for_faces<'a>(&'a self, slots: impl Iterator<Item = u32>, reads: &mut Reads<'a>) {
-        for slot in slots {
-            if let Some(c) = self.fans.corners.get(slot as usize) {
-                reads.ask(&c[0]);
-                reads.ask(&self.fans.links[slot as usize][0]);
+            if !by_strokes {
+                let first = shelf.first_slot(h);
+                canvas.ask_for_faces(canvas.across(first).chain(canvas.across(first + 1)), &mut reads);
             }
         }
+        reads.wait();
     }
 }

@@ -168,6 +168,19 @@ fn on_the_way(head: &MeshHead, [c, page]: [&Chunk; 2], room: Room, settled: bool
     usize::try_from(all).unwrap_or(usize::MAX / 4)
 }
 
+/// The chunk of split `i`, given the first of each and the number of all, and the chunk of every [`STRIDE`]th; of none there is, one more than there are.
+#[inline]
+fn chunk_of(i: u32, firsts: &[u32], index: &[u32]) -> usize {
+    if firsts.last().is_none_or(|&all| i >= all) {
+        return firsts.len().saturating_sub(1);
+    }
+    let mut k = index.get(i as usize / STRIDE).map_or(0, |&k| k as usize);
+    while firsts.get(k + 1).is_some_and(|&first| first <= i) {
+        k += 1;
+    }
+    k
+}
+
 /// What it takes to get a page.
 pub(super) enum Fetch {
     /// It is there.
@@ -383,14 +396,13 @@ impl<S: ByteRanges> Shelf<S> {
     /// The chunk of split `i`; of none there is, one more than there are.
     #[inline]
     fn chunk_of(&self, i: u32) -> usize {
-        if i as usize >= self.head.splits as usize {
-            return self.chunks.len();
-        }
-        let mut k = self.index.get(i as usize / STRIDE).map_or(0, |&k| k as usize);
-        while self.firsts.get(k + 1).is_some_and(|&first| first <= i) {
-            k += 1;
-        }
-        k
+        chunk_of(i, &self.firsts, &self.index)
+    }
+
+    /// Says of splits if their pages are not there.
+    pub(super) fn missing(&self) -> impl Fn(u32) -> bool + Sync + '_ {
+        let (firsts, index, pages) = (&self.firsts[..], &self.index[..], &self.pages[..]);
+        move |i| pages.get(chunk_of(i, firsts, index)).is_none_or(|p| p.is_none())
     }
 
     /// The page of split `i` if it is there, and the split's place in it.

@@ -5,7 +5,7 @@ use super::{Damage, SplitCode};
 use crate::aif::NONE;
 
 /// Corners (as wedges) and links of the faces there are.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Fans {
     pub(crate) corners: Vec<[u32; 3]>,
     pub(crate) links: Vec<[u32; 3]>,
