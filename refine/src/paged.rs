@@ -157,10 +157,10 @@ impl<S: ByteRanges> PagedView<S> {
     pub fn new(reader: Arc<RangeReader<S>>, m: u32, limit: usize) -> Result<Self, PagedError> {
         let (shelf, fans) = Shelf::new(reader, m)?;
         let (vertices, faces) = (shelf.base.vertices(), fans.corners.len());
-        let clock = Clocks::new(shelf.base.links.diagonal);
+        let (clock, splits) = (Clocks::new(shelf.base.links.diagonal), shelf.head.splits as usize);
         let mut view = PagedView {
             shelf,
-            drawing: Drawing::new(fans),
+            drawing: Drawing::new(fans, splits),
             vertices,
             faces,
             applied: 0,

@@ -523,6 +523,48 @@ fn pages_made_ahead_change_nothing() {
     }
 }
 
+/// On a flight from frame to frame the meshes are those in memory, on one thread and on several: what is looked at, drawn and found by others is what one would find.
+#[test]
+fn on_a_flight_the_meshes_are_those_in_memory() {
+    for (rule, placement) in [(Rule::Rings, None), (Rule::Cuts, Some(Placement::Endpoint))] {
+        let bytes = file_by(rule, 512, "scan", 40_000, placement);
+        let h = in_memory(&bytes);
+        let numbers = numbers(&bytes, &h);
+        let (centre, diagonal) = h.extent();
+        let fly = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let (mut view, mut out) = (View::new(h.clone()), paged(&bytes, PLENTY));
+                let (mut splits, mut collapses, mut indices) = (0, 0, Vec::new());
+                for k in 0..24 {
+                    // To it, and away.
+                    let near = 12.0 - (k as f64 - 12.0).abs();
+                    let c = camera(centre, diagonal, 0.03 * k as f64, 1.2 - 0.06 * near);
+                    let lens = Lens::new(&h, &c, &DMat4::IDENTITY, 1.0, Cull::Frustum).unwrap();
+                    let done = view.adapt(&lens, &Limits::default());
+                    let lens = out.lens(&c, &DMat4::IDENTITY, 1.0, Cull::Frustum).unwrap();
+                    let found = out.adapt(&[lens], &PagedLimits::default()).unwrap();
+                    let what = |d: Done| (d.splits, d.collapses, d.complete, d.refused);
+                    assert_eq!(what(found.done), what(done), "frame {k}");
+                    same(&view, &out, &numbers);
+                    assert_closed(&out);
+                    if k > 0 {
+                        (splits, collapses) = (splits + done.splits, collapses + done.collapses);
+                    }
+                    let (runs, wedges) = out.take_changes();
+                    indices.push((out.indices().to_vec(), runs, wedges, out.bytes()));
+                }
+                // Handfuls of them.
+                assert!(splits > 24 * 64 && collapses > 24 * 64, "{splits} {collapses}");
+                indices
+            })
+        };
+        // To the slot.
+        let alone = fly(1);
+        assert!([2, 3].iter().all(|&threads| fly(threads) == alone));
+    }
+}
+
 /// Through little memory: it is kept, no frame is coarser than asked, and where there is no room for motions what changes jumps.
 #[test]
 fn geomorphs_keep_the_limit() {
@@ -757,11 +799,12 @@ fn no_place_is_off_by_more_than_the_tolerance() {
 /// Contents of pages and bounds that lie under a right checksum: an error, or some closed mesh, and no panic.
 #[test]
 fn pages_that_lie_are_no_panic() {
-    let (mut told, mut shown) = (0, 0);
+    let (mut told, mut shown, mut contradict) = (0, 0, 0);
     for rule in [Rule::Rings, Rule::Cuts] {
         let bytes = file_by(rule, 60, "scan", 400, None);
         let chunks = RangeReader::new(&bytes[..]).unwrap().directory().chunks.clone();
-        for c in chunks.iter().filter(|c| [ChunkType::PAGE, ChunkType::BOUNDS].contains(&c.kind)) {
+        let lie = [ChunkType::SPLITS, ChunkType::PAGE, ChunkType::BOUNDS];
+        for c in chunks.iter().filter(|c| lie.contains(&c.kind)) {
             for at in c.range().step_by(5) {
                 let mut bad = bytes.clone();
                 bad[at as usize] ^= [0x01, 0x80, 0xFF, 0x10][at as usize % 4];
@@ -777,6 +820,7 @@ fn pages_that_lie_are_no_panic() {
                     let Ok(lens) = out.lens(&c, &DMat4::IDENTITY, tau, Cull::None) else { break };
                     let done = out.adapt(&[lens], &PagedLimits::default());
                     told += usize::from(done.is_err());
+                    contradict += usize::from(matches!(done, Err(PagedError::Damage(_))));
                     if k == 0 {
                         _ = out.set_timed(Some(2));
                     }
@@ -786,7 +830,7 @@ fn pages_that_lie_are_no_panic() {
             }
         }
     }
-    assert!(told > 100 && shown > 100, "{told} {shown}");
+    assert!(told > 100 && shown > 100 && contradict > 10, "{told} {shown} {contradict}");
 }
 
 /// Every byte of a chunk turned over is an error that names it, or changes nothing: checksums stand before all else.

@@ -179,9 +179,9 @@ impl Sheet for Canvas {
 /// Strokes that are handed over at a time: a thread is woken for as many.
 const HANDFUL: usize = 64;
 /// Handfuls that may wait; then who made them draws, too.
-const WAITING: usize = 32;
+const WAITING: usize = 16;
 /// Splits that are applied until it is asked if all could be drawn.
-const MOST: usize = 4096;
+const MOST: usize = 2048;
 /// How often it is asked in vain for what another thread has before it is slept for: some tens of microseconds.
 const PATIENCE: usize = 1000;
 
@@ -263,19 +263,23 @@ pub(super) struct Drawing {
     outcome: Outcome,
     /// Records of the splits whose strokes were made since then.
     log: Vec<u32>,
+    /// Handfuls that may wait.
+    waiting: usize,
 }
 
 impl Drawing {
-    pub(super) fn new(fans: Fans) -> Drawing {
+    /// With the faces of the base; `splits` can come.
+    pub(super) fn new(fans: Fans, splits: usize) -> Drawing {
         let touched = vec![0; fans.corners.len().div_ceil(64)];
         let canvas = Canvas { fans, touched, touched_wedges: 0, slots: 0 };
-        let (strokes, log) = (Vec::with_capacity(HANDFUL), Vec::with_capacity(MOST));
-        Drawing { canvas, away: None, strokes, outcome: Outcome::default(), log }
+        let (strokes, log) = (Vec::with_capacity(HANDFUL), Vec::with_capacity(MOST.min(splits)));
+        let waiting = WAITING.min(splits / HANDFUL);
+        Drawing { canvas, away: None, strokes, outcome: Outcome::default(), log, waiting }
     }
 
     /// Bytes held, strokes that may wait included.
     pub(super) fn bytes(&self) -> usize {
-        let strokes = (WAITING + 2) * HANDFUL * size_of::<Stroke>();
+        let strokes = (self.waiting + 2) * HANDFUL * size_of::<Stroke>();
         let faces = self.away.as_ref().map_or_else(|| self.canvas.bytes(), |a| a.1);
         faces + strokes + 4 * self.log.capacity()
     }
@@ -316,7 +320,7 @@ impl Drawing {
             None => {
                 let bytes = self.canvas.bytes();
                 let canvas = Mutex::new((std::mem::take(&mut self.canvas), std::mem::take(&mut self.outcome)));
-                let strokes = Mutex::new(VecDeque::with_capacity(WAITING));
+                let strokes = Mutex::new(VecDeque::with_capacity(self.waiting + 1));
                 &self.away.insert((Arc::new(Easel { canvas, strokes }), bytes)).0
             }
         };
@@ -326,7 +330,7 @@ impl Drawing {
             strokes.push_back(handful);
             strokes.len()
         };
-        if waiting > WAITING {
+        if waiting > self.waiting {
             easel.draw();
         } else {
             let easel = easel.clone();

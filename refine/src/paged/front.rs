@@ -299,3 +299,131 @@ impl<S: ByteRanges> Sheet for PagedView<S> {
         self.drawing.canvas.touched_wedges += 1;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aif::{BuildOptions, Mesh, MeshInput};
+    use crate::format::{EncodeOptions, RangeReader, encode};
+    use crate::hierarchy::{self, Bounds};
+    use crate::paged::PagedLimits;
+    use crate::progressive::build;
+    use crate::selective::{Cull, Lens};
+    use crate::simplify::{Options, Quiet};
+    use crate::view::{Camera, CameraParameters, Projection};
+    use glam::{DMat4, DVec3};
+    use std::sync::Arc;
+
+    /// Hills, with pages.
+    fn file(n: u32) -> Vec<u8> {
+        let at = |x: u32, y: u32| y * (n + 1) + x;
+        let height = |x: u32, y: u32| ((x as f32 * 0.7).sin() + (y as f32 * 0.9).cos()) * 2.0;
+        let places = (0..=n).flat_map(|y| (0..=n).map(move |x| [x as f32, y as f32, height(x, y)]));
+        let cells = (0..n).flat_map(|y| (0..n).map(move |x| (x, y)));
+        let faces = cells.flat_map(|(x, y)| {
+            let (a, b, c, d) = (at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1));
+            [[a, b, c], [a, c, d]]
+        });
+        let input =
+            MeshInput::triangles(places.collect::<Vec<[f32; 3]>>(), &faces.collect::<Vec<[u32; 3]>>());
+        let mesh = Mesh::build(input, &BuildOptions::default()).unwrap().0;
+        let mut pm = build(mesh, &Options::default(), &Quiet).unwrap().mesh;
+        pm.bounds = Some(Arc::new(Bounds::measure(&pm, &hierarchy::Options::RINGS).unwrap()));
+        let o = EncodeOptions::default().with_any_order(true).with_pages(true).with_chunk(Some(300));
+        encode(&[pm], &[], &[], &o).unwrap()
+    }
+
+    fn lens(view: &PagedView<&[u8]>, tau: f64) -> [Lens; 1] {
+        let (centre, diagonal) = view.extent();
+        let camera = Camera::new(&CameraParameters {
+            eye: centre + DVec3::new(0.6, 0.2, 0.5) * diagonal,
+            target: centre,
+            up: DVec3::Z,
+            projection: Projection::Perspective { fov_y_deg: 50.0 },
+            width: 800,
+            height: 600,
+            near: 1e-3 * diagonal,
+            far: 4.0 * diagonal,
+        });
+        [view.lens(&camera.unwrap(), &DMat4::IDENTITY, tau, Cull::None).unwrap()]
+    }
+
+    /// Faces, each from its least corner, ascending.
+    fn faces(view: &PagedView<&[u8]>) -> Vec<[u32; 3]> {
+        let slots = (0..view.indices().len()).filter(|&s| view.face_in(s).is_some());
+        let turned = |f: [u32; 3]| [f, [f[1], f[2], f[0]], [f[2], f[0], f[1]]].into_iter().min().unwrap();
+        let mut all: Vec<_> = slots.map(|s| turned(view.indices()[s])).collect();
+        all.sort_unstable();
+        all
+    }
+
+    fn assert_sound(view: &PagedView<&[u8]>) {
+        assert_eq!((faces(view).len(), view.vertices().count()), (view.face_count(), view.vertex_count()));
+        assert_eq!((view.led, view.led_faces), (view.applied, view.faces));
+        let applied: Vec<u32> = view.applied_splits().collect();
+        assert_eq!(applied.len(), view.applied());
+        let mut dependents = vec![0u16; view.shelf.pool.of.len()];
+        for i in applied {
+            let mut needs = Vec::new();
+            view.shelf.needs_into(i, &mut needs).unwrap();
+            let own = view.shelf.needs(i).unwrap();
+            for &h in needs.iter().filter(|&&h| h != NONE) {
+                assert_eq!(view.shelf.pool.get(h).unwrap().flags & (APPLIED | LED), APPLIED | LED);
+                dependents[h as usize] += 1;
+            }
+            // All that it names is there.
+            let named = own.iter().chain(view.shelf.further(i)).filter(|&&d| d != NONE).count();
+            assert_eq!(needs.iter().filter(|&&h| h != NONE).count(), named);
+        }
+        for (h, r) in view.shelf.pool.of.iter().enumerate().filter(|(_, r)| r.flags != 0) {
+            assert_eq!((r.dependents, view.last.has(h as u32)), (dependents[h], dependents[h] == 0));
+        }
+        for slot in 0..view.indices().len() {
+            for (edge, other) in view.neighbours(slot).into_iter().enumerate() {
+                let back = other.map(|o| view.neighbours(o).contains(&Some(slot)));
+                assert!(back.unwrap_or(true), "slot {slot} edge {edge}");
+            }
+        }
+    }
+
+    /// A cut that is none of the split's vertex is found out when the split is drawn, maybe by another thread: that split and all that were asked for after it are taken back. When the cut is right again so is the mesh.
+    #[test]
+    fn what_cannot_be_drawn_is_taken_back() {
+        let bytes = file(60);
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let reader = Arc::new(RangeReader::new(&bytes[..]).unwrap());
+                let mut view = PagedView::new(reader, 0, 1 << 28).unwrap();
+                let (fine, coarse) = (lens(&view, 0.5), lens(&view, f64::INFINITY));
+                let go = |view: &mut PagedView<&[u8]>, to: &[Lens]| view.adapt(to, &PagedLimits::default());
+                go(&mut view, &fine).unwrap();
+                assert_sound(&view);
+                let (shown, applied) = (faces(&view), view.applied_splits().collect::<Vec<_>>());
+                assert!(applied.len() > 1000);
+                let (mut some, mut none) = (0, 0);
+                for &i in applied.iter().step_by(97) {
+                    go(&mut view, &coarse).unwrap();
+                    assert_eq!(view.applied(), 0);
+                    let turn = |view: &mut PagedView<&[u8]>, by: u32| {
+                        let (p, k) = view.shelf.page_mut(i).unwrap();
+                        let left = &mut p.of[k].left;
+                        *left = *left & !3 | ((*left & 3) + by) % 3;
+                    };
+                    turn(&mut view, 1);
+                    let result = go(&mut view, &fine);
+                    assert!(matches!(result, Err(PagedError::Damage(_))), "split {i}: {result:?}");
+                    assert_sound(&view);
+                    assert!(!view.is_applied(i));
+                    some += usize::from(view.applied() > 64);
+                    none += usize::from(view.applied() < 64);
+                    turn(&mut view, 2);
+                    go(&mut view, &fine).unwrap();
+                    assert_sound(&view);
+                    assert!(faces(&view) == shown, "split {i}");
+                }
+                assert!(some > 0 && none > 0, "{some} {none}");
+            });
+        }
+    }
+}

@@ -60,7 +60,7 @@ pub(super) struct List {
     near_horizon: Option<Sums>,
     /// Places that are due in this frame, ascending; some may have been taken out since.
     ready: Vec<u32>,
-    /// So many were due.
+    /// So many were due when that was found out last.
     were_due: usize,
     /// A bit for every place, all 0: to sort with.
     sorting: Vec<u64>,
@@ -206,20 +206,22 @@ impl List {
             self.ready.clear();
             let there = (0..).zip(&self.due).filter(|(_, d)| **d != Due::NEVER).map(|(at, _)| at);
             self.ready.extend(there);
-            return self.ready.len();
+            self.were_due = self.ready.len();
+            return self.were_due;
         }
         match self.horizon.filter(|h| h.include(now)) {
             Some(_) => self.ask_soon(now, clock),
             None => {
                 // So many that asking all, shared by the frames to the horizon, takes as long as asking those that come before it.
-                let frames = self.of.len() as f64 / self.ready.len().max(1) as f64;
+                let frames = self.of.len() as f64 / self.were_due.max(1) as f64;
                 self.forget();
                 let horizon = clock.horizon(frames.sqrt().clamp(1.0, FRAMES));
                 self.ask_all(now, horizon);
                 self.horizon = Some(horizon);
             }
         }
-        self.ready.len()
+        self.were_due = self.ready.len();
+        self.were_due
     }
 
     fn forget(&mut self) {
@@ -294,7 +296,6 @@ impl List {
         sort: impl Fn(&Entry, bool, Due) -> (Option<Mark>, Due),
     ) {
         let mut told = vec![(false, Due::NEVER); self.ready.len().min(BLOCK)];
-        self.were_due = self.ready.len();
         let (mut from, mut kept) = (0, 0);
         while from < self.ready.len() {
             let to = (from + BLOCK).min(self.ready.len());
@@ -458,5 +459,60 @@ mod tests {
         }
         assert!(found_soon > 1000 && all_found < 300 * 250, "{found_soon} of {all_found}");
         assert!(near > 100 && (room > 100 || full > 20), "{near} {full}");
+    }
+
+    /// Few and many, by one thread and by several: what is marked is what is needed, and of the others is noted when they are due, as if each was looked at alone.
+    #[test]
+    fn what_is_looked_at_is_marked_or_told_when() {
+        let camera = Camera::new(&CameraParameters {
+            eye: DVec3::new(-0.5, 0.0, 0.1),
+            target: DVec3::ZERO,
+            up: DVec3::Z,
+            projection: Projection::Perspective { fov_y_deg: 50.0 },
+            width: 800,
+            height: 600,
+            near: 1e-3,
+            far: 20.0,
+        });
+        let lens = Lens::about(DVec3::ZERO, &camera.unwrap(), &DMat4::IDENTITY, 1.0, Cull::Frustum);
+        let lens = [lens.unwrap()];
+        let judges = Judges::new(&lens, 1.0);
+        for count in [0, 1, 33, 700, 3000, 9001] {
+            for threads in [1, 2, 3] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let (mut clock, mut list) = (Clocks::new(1.4), List::default());
+                clock.go_on(&judges);
+                list.reserve_to([count; 2]);
+                list.extend_to(count);
+                for at in 0..count as u32 {
+                    let k = f64::from(at);
+                    list.put(at, entry(at, DVec3::new((k * 0.618).fract(), (k * 0.414).fract(), 0.0) - 0.5));
+                }
+                (0..count as u32).step_by(5).for_each(|at| list.take_out(at));
+                let many = clock.next(&judges);
+                let due = list.begin(true, &clock);
+                assert_eq!(due, count - count.div_ceil(5));
+                // Gone since.
+                (0..count as u32).skip(1).step_by(35).for_each(|at| list.take_out(at));
+                pool.install(|| {
+                    list.look((&clock, &many), |e, wanted, due| match wanted {
+                        true => (Some(if e.split % 2 == 0 { Mark::Now } else { Mark::Later }), due),
+                        false => (None, due),
+                    });
+                });
+                let mut marked = (0..).map_while(|k| list.marked(k));
+                for at in (0..count as u32).filter(|at| at % 5 != 0 && at % 35 != 1) {
+                    let mut looked = Looked::default();
+                    clock.look(&many, &[list.of[at as usize]], &mut looked);
+                    let (wanted, due) = looked.each().next().unwrap();
+                    let even = at % 2 == 0;
+                    assert_eq!(list.due(at), if wanted && even { Due::NOW } else { due });
+                    if wanted {
+                        assert_eq!(marked.next(), Some((at, if even { Mark::Now } else { Mark::Later })));
+                    }
+                }
+                assert_eq!(marked.next(), None);
+            }
+        }
     }
 }
