@@ -12,7 +12,7 @@
 //! no cracks. [`PagedView::bytes`] never exceeds the limit: where that is too small, or fetches are limited, the mesh is coarser than asked, and
 //! [`PagedDone`] says so. Damage found on the way is an error that leaves the mesh somewhere between that of the last frame and that of this, sound and closed.
 //!
-//! Where the source can be read by other threads, up to an eighth of what is free at the first frame is set aside, whatever the number of threads, for pages that they decode before they are needed
+//! Where the source can be read by other threads, up to an eighth of what is free at the first frame, a third where an eighth is too little for a few pages, is set aside, whatever the number of threads, for pages that they decode before they are needed
 //! (`ahead.rs`); [`PagedView::trim`] does not give it back.
 //!
 //! Not guaranteed: what order the input had (`ORDR` is not read): vertices and faces come in the order of the file. Edges without faces come with the base.
@@ -41,8 +41,8 @@ use crate::hierarchy::{Packed, Rule};
 use crate::progressive::Damage;
 use crate::selective::{Clocks, Cull, Entry, Followed, Lens, LensError, Motions};
 use crate::view::Camera;
-use glam::{DMat4, DVec3, Vec3};
 use canvas::Drawing;
+use glam::{DMat4, DVec3, Vec3};
 use list::{List, PLACE, THERE, grown};
 use pool::Hot;
 use queue::Queue;

@@ -214,17 +214,15 @@ impl<S: ByteRanges> PagedView<S> {
     }
 
     /// Without limits, and with room for what comes, it does not matter what comes first: then both lists are looked through at once, by two threads, before anything is undone, and what is needed is applied in waves.
-    fn adapt_in_waves(
-        &mut self,
-        desk: &mut Desk<'_>,
-        frame: &mut Frame<'_>,
-    ) -> Result<(), PagedError> {
+    fn adapt_in_waves(&mut self, desk: &mut Desk<'_>, frame: &mut Frame<'_>) -> Result<(), PagedError> {
         self.look_at_both(desk);
         let (mut lot, mut freed) = (Vec::with_capacity(2 * LOT), Vec::new());
         let mut k = 0;
         while self.last.marked(k).is_some() {
             lot.clear();
-            while lot.len() < LOT && let Some((place, _)) = self.last.marked(k) {
+            while lot.len() < LOT
+                && let Some((place, _)) = self.last.marked(k)
+            {
                 lot.push(place);
                 k += 1;
             }

@@ -319,7 +319,8 @@ impl Drawing {
             Some((easel, _)) => easel,
             None => {
                 let bytes = self.canvas.bytes();
-                let canvas = Mutex::new((std::mem::take(&mut self.canvas), std::mem::take(&mut self.outcome)));
+                let canvas =
+                    Mutex::new((std::mem::take(&mut self.canvas), std::mem::take(&mut self.outcome)));
                 let strokes = Mutex::new(VecDeque::with_capacity(self.waiting + 1));
                 &self.away.insert((Arc::new(Easel { canvas, strokes }), bytes)).0
             }

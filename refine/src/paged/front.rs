@@ -193,7 +193,7 @@ impl<S: ByteRanges> PagedView<S> {
             return Err(Damage::Fan(hot.split as usize).into());
         }
         if self.draws_by_strokes() && s.code.kind() != SplitKind::Explicit {
-            let right = if s.code.two_faces() { first + 1 << 2 } else { NONE };
+            let right = if s.code.two_faces() { (first + 1) << 2 } else { NONE };
             self.drawing.put(h, stroke(&s, first, [first << 2, right], false));
         } else {
             self.finish_drawing()?;
@@ -227,7 +227,6 @@ impl<S: ByteRanges> PagedView<S> {
         self.faces -= 1 + hot.code.two_faces() as usize;
         self.applied -= 1;
     }
-
 }
 
 /// The stroke of a split with its first slot.
@@ -408,7 +407,7 @@ mod tests {
                     let turn = |view: &mut PagedView<&[u8]>, by: u32| {
                         let (p, k) = view.shelf.page_mut(i).unwrap();
                         let left = &mut p.of[k].left;
-                        *left = *left & !3 | ((*left & 3) + by) % 3;
+                        *left = (*left & !3) | (((*left & 3) + by) % 3);
                     };
                     turn(&mut view, 1);
                     let result = go(&mut view, &fine);

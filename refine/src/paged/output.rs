@@ -18,7 +18,8 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// The face of the progressive mesh in a slot of the index buffer; none in one that is free, or is not there.
     pub fn face_in(&self, slot: usize) -> Option<u32> {
-        let slot = u32::try_from(slot).ok().filter(|&s| (s as usize) < self.drawing.canvas.fans.corners.len())?;
+        let slot =
+            u32::try_from(slot).ok().filter(|&s| (s as usize) < self.drawing.canvas.fans.corners.len())?;
         let Some(k) = slot.checked_sub(self.shelf.head.base_faces) else { return Some(slot) };
         let h = self.shelf.pool.get(k / 2).filter(|h| h.flags & APPLIED != 0)?;
         (k % 2 == 0 || h.code.two_faces()).then(|| self.shelf.head.first_face(h.split) + k % 2)
@@ -98,8 +99,9 @@ impl<S: ByteRanges> PagedView<S> {
             }
             number.insert(v, number.len() as u32);
         }
-        let mut slots: Vec<(u32, u32)> =
-            (0..self.drawing.canvas.fans.corners.len()).filter_map(|s| Some((self.face_in(s)?, s as u32))).collect();
+        let mut slots: Vec<(u32, u32)> = (0..self.drawing.canvas.fans.corners.len())
+            .filter_map(|s| Some((self.face_in(s)?, s as u32)))
+            .collect();
         slots.sort_unstable();
         let corners = || slots.iter().flat_map(|&(_, s)| self.drawing.canvas.fans.corners[s as usize]);
         let of = |v: u32| number.get(&v).copied().unwrap_or(0);
