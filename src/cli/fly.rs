@@ -29,7 +29,7 @@ use shots::ShotArgs;
 
 /// Fly a camera along a path, refine the mesh for every frame, and report what that took.
 ///
-/// Every frame starts from the mesh of the one before. Times are of refining alone, on one thread. What is measured is the largest
+/// Every frame starts from the mesh of the one before. Times are of refining alone. What is measured is the largest
 /// lambda * distance / depth over samples of the input that the camera sees from their front, by code that shares nothing with what decides; of a terrain, with --grid,
 /// the largest distance in the picture between a sample and the surface above or below it.
 #[derive(clap::Args, Debug)]

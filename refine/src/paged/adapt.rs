@@ -138,7 +138,7 @@ enum Gathered {
 
 impl<S: ByteRanges> PagedView<S> {
     /// Adapts the mesh to what any of the lenses needs, as far as the limits, the memory and the fetches allow: first undoes what is not needed, then applies what is, the
-    /// worst first. Looks at what may have changed since it was looked at last; O(valence) for every split applied or undone.
+    /// worst first where limits make that matter (of a frame that runs out of room unexpectedly, in the next). Looks at what may have changed since it was looked at last; O(valence) for every split applied or undone.
     ///
     /// Errors: damage, the source's. The mesh is sound then, and closed, somewhere on the way.
     pub fn adapt(&mut self, lenses: &[Lens], limits: &PagedLimits<'_>) -> Result<PagedDone, PagedError> {
