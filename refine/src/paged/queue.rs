@@ -43,28 +43,23 @@ impl Queue {
             false => each * (capacity + grown(capacity)),
         };
         match self.waves {
-            // They change places.
-            true => 2 * more(self.found.len(), self.found.capacity().min(self.wave.capacity()), 4),
+            true => more(self.found.len(), self.found.capacity(), 4),
             false => more(self.by_rank.len(), self.by_rank.capacity(), 8),
         }
     }
 
     /// For what [`Queue::growth`] says there is room.
     pub(super) fn push(&mut self, rank: u16, split: u32) {
-        fn grow<T>(v: &mut Vec<T>) {
-            v.reserve_exact(grown(v.capacity()));
-        }
-        if !self.waves {
-            if self.by_rank.len() == self.by_rank.capacity() {
-                self.by_rank.reserve_exact(grown(self.by_rank.capacity()));
+        if self.waves {
+            if self.found.len() == self.found.capacity() {
+                self.found.reserve_exact(grown(self.found.capacity()));
             }
-            self.by_rank.push((rank, Reverse(split)));
-            return;
+            return self.found.push(split);
         }
-        if self.found.len() == self.found.capacity() {
-            grow(&mut self.found);
+        if self.by_rank.len() == self.by_rank.capacity() {
+            self.by_rank.reserve_exact(grown(self.by_rank.capacity()));
         }
-        self.found.push(split);
+        self.by_rank.push((rank, Reverse(split)));
     }
 
     /// Takes the next; of `rank` only, if that is given, where it is not in waves.
@@ -99,4 +94,50 @@ impl Queue {
 /// How many more an array of such a capacity is given room for.
 fn grown(capacity: usize) -> usize {
     capacity / 2 + 256
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// By rank the worst comes first, of those the first; in waves each in the order of the file. Nothing is lost, and no more is held than was said.
+        #[test]
+        fn all_come_in_their_order(
+            waves: bool,
+            found in prop::collection::vec((0u16..5, 0u32..1000, 0usize..3), 0..900),
+        ) {
+            let mut queue = Queue::default();
+            queue.begin(waves);
+            let (mut there, mut wave): (Vec<(u16, u32)>, Vec<u32>) = (Vec::new(), Vec::new());
+            let mut pops = |queue: &mut Queue, there: &mut Vec<(u16, u32)>| {
+                if !waves {
+                    let next = there.iter().copied().max_by_key(|&(r, i)| (r, Reverse(i)));
+                    assert_eq!(queue.rank(), next.map(|n| n.0));
+                    // None of another rank.
+                    assert_eq!(queue.pop(Some(9)), None);
+                    let own = next.map(|n| n.0);
+                    assert_eq!(queue.pop(own), next.map(|n| n.1));
+                    next.iter().for_each(|n| _ = there.swap_remove(there.iter().position(|t| t == n).unwrap()));
+                } else {
+                    if wave.is_empty() {
+                        wave.extend(there.drain(..).map(|t| t.1));
+                        wave.sort_unstable_by_key(|&i| Reverse(i));
+                    }
+                    assert_eq!((queue.rank(), queue.pop(None)), (None, wave.pop()));
+                }
+                assert_eq!(queue.len(), there.len() + wave.len());
+            };
+            for &(rank, split, taken) in &found {
+                let (before, growth) = (queue.bytes(), queue.growth());
+                queue.push(rank, split);
+                there.push((rank, split));
+                assert!(queue.bytes() <= before + growth);
+                (0..taken).for_each(|_| pops(&mut queue, &mut there));
+            }
+            (0..=found.len()).for_each(|_| pops(&mut queue, &mut there));
+            assert_eq!((queue.len(), queue.next(9).count()), (0, 0));
+        }
+    }
 }
