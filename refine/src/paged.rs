@@ -12,7 +12,7 @@
 //! no cracks. [`PagedView::bytes`] never exceeds the limit: where that is too small, or fetches are limited, the mesh is coarser than asked, and
 //! [`PagedDone`] says so. Damage found on the way is an error that leaves the mesh somewhere between that of the last frame and that of this, sound and closed.
 //!
-//! Where the source can be read by other threads, up to an eighth of what is free at the first frame, a third where an eighth is too little for a few pages, is set aside, whatever the number of threads, for pages that they decode before they are needed
+//! Where the source can be read by other threads, up to an eighth of what is free at the first frame, a third where an eighth is too little for a few pages and what is shown has room, is set aside, whatever the number of threads, for pages that they decode before they are needed
 //! (`ahead.rs`); [`PagedView::trim`] does not give it back.
 //!
 //! Not guaranteed: what order the input had (`ORDR` is not read): vertices and faces come in the order of the file. Edges without faces come with the base.
@@ -128,6 +128,8 @@ pub struct PagedView<S> {
     clock: Clocks,
     /// The last frame did not look at all that was due.
     cut: bool,
+    /// The last frame had no room for something.
+    short: bool,
     /// There was a frame.
     begun: bool,
     limit: usize,
@@ -181,6 +183,7 @@ impl<S: ByteRanges> PagedView<S> {
             resume: [0; 2],
             clock,
             cut: false,
+            short: false,
             begun: false,
             limit,
         };
@@ -285,7 +288,7 @@ impl<S: ByteRanges> PagedView<S> {
         self.limit = bytes;
     }
 
-    /// Bytes held: the sum of the capacities of all arrays, but for copies of the last frame's lenses. While a chunk is decoded, a part of the limit that is set aside for that is used as well.
+    /// Bytes held: the sum of the capacities of all arrays, but for copies of the last frame's lenses, and for less than 128 KiB that a frame takes to look at many splits. While a chunk is decoded, a part of the limit that is set aside for that is used as well.
     pub fn bytes(&self) -> usize {
         self.shelf.bytes()
             + self.drawing.bytes()
@@ -327,6 +330,7 @@ impl<S: ByteRanges> PagedView<S> {
         match free {
             None => self.shelf.set_aside(0),
             Some(free) if !self.begun => self.shelf.set_aside(free),
+            Some(_) if self.short => self.shelf.set_aside_least(),
             Some(_) => {}
         }
         self.begun = true;
@@ -417,8 +421,10 @@ impl<S: ByteRanges> PagedView<S> {
         if fits && beside + moving == 0 {
             return true;
         }
-        // Faces are here to be grown.
-        self.drawing.gather();
+        if !fits {
+            // Faces are here to be grown.
+            self.drawing.gather();
+        }
         // Those that are too small grow by so many at least.
         let to = |ahead: usize| {
             let mut to = [0; 3];

@@ -523,6 +523,42 @@ fn pages_made_ahead_change_nothing() {
     }
 }
 
+/// Room that is set aside for pages made ahead, beyond the least, is there for what is shown once that runs short of it, on any number of threads.
+#[test]
+fn room_set_aside_is_given_to_what_is_shown() {
+    let bytes = file_by(Rule::Rings, 256, "scan", 80_000, None);
+    let fly = |limit: usize, shared: bool, threads: usize| -> Vec<(usize, usize)> {
+        fn go<S: ByteRanges>(source: S, limit: usize) -> Vec<(usize, usize)> {
+            let mut view = PagedView::new(Arc::new(RangeReader::new(source).unwrap()), 0, limit).unwrap();
+            let (centre, diagonal) = view.extent();
+            let lens = view.lens(&camera(centre, diagonal, 0.3, 0.8), &DMat4::IDENTITY, 0.0, Cull::None);
+            let lens = [lens.unwrap()];
+            let frame = |_| {
+                let done = view.adapt(&lens, &PagedLimits::default()).unwrap();
+                assert!(view.bytes() <= limit);
+                (view.applied(), done.no_room)
+            };
+            (0..6).map(frame).collect()
+        }
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let source = Slow { bytes: Arc::new(bytes.clone()), ahead: Arc::default() };
+        pool.install(|| if shared { go(source, limit) } else { go(&bytes[..], limit) })
+    };
+    let (base, mut given) = (needed(&bytes), 0);
+    for more in (4000..16_000).step_by(2000) {
+        let limit = base + (more << 10);
+        let (with, without) = (fly(limit, true, 1), fly(limit, false, 1));
+        assert_eq!(with, fly(limit, true, 3));
+        if with[0].1 == 0 {
+            continue;
+        }
+        // But for the eighth.
+        assert!(10 * with[5].0 > 8 * without[5].0, "{limit}: {with:?} {without:?}");
+        given += usize::from(10 * with[0].0 < 9 * with[5].0);
+    }
+    assert!(given > 0);
+}
+
 /// On a flight from frame to frame the meshes are those in memory, on one thread and on several: what is looked at, drawn and found by others is what one would find.
 #[test]
 fn on_a_flight_the_meshes_are_those_in_memory() {

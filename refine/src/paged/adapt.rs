@@ -160,7 +160,8 @@ impl<S: ByteRanges> PagedView<S> {
             self.grow_ahead();
         }
         // In waves nothing was noted of what there was no room for.
-        let lost = frame.waves && frame.all.no_room > 0;
+        self.short = frame.all.no_room > 0;
+        let lost = frame.waves && self.short;
         self.cut = frame.meter.over || !frame.whole || lost;
         let all = &mut frame.all;
         all.done = frame.meter.done;
@@ -194,7 +195,7 @@ impl<S: ByteRanges> PagedView<S> {
             && limits.expired.is_none()
             && frame.fetches == usize::MAX;
         // In the first frame it shows how much is needed.
-        if unlimited && !all && self.motions.is_none() && self.is_roomy() {
+        if unlimited && !all && !self.short && self.motions.is_none() && self.is_roomy() {
             frame.waves = true;
             return self.adapt_in_waves(&mut desk, frame);
         }
@@ -413,7 +414,7 @@ impl<S: ByteRanges> PagedView<S> {
                     lot.push(i);
                 }
             }
-            if self.shelf.looks_ahead && !self.queue.in_waves() {
+            if self.shelf.looks_ahead {
                 // Those on top of the queue come next.
                 let next = self.queue.next(IN_SIGHT);
                 lot.iter().copied().chain(next).for_each(|i| _ = self.shelf.wish(i, true));
@@ -541,7 +542,6 @@ impl<S: ByteRanges> PagedView<S> {
             frame.meter.done.refused += 1;
             return Ok(());
         }
-        self.see_drawing()?;
         if !self.reserve(closure.len()) {
             frame.full = true;
             frame.all.no_room += 1;
@@ -551,6 +551,7 @@ impl<S: ByteRanges> PagedView<S> {
             if !frame.meter.goes_on() {
                 return Ok(());
             }
+            self.see_drawing()?;
             self.apply(j)?;
             let done = &mut frame.meter.done;
             done.splits += 1;

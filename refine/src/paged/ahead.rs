@@ -168,6 +168,8 @@ pub(super) struct Ahead {
     most: usize,
     /// Bytes set aside.
     room: usize,
+    /// Bytes that would be at least, if more are.
+    least: Option<usize>,
 }
 
 impl Drop for Ahead {
@@ -192,12 +194,24 @@ fn shares(room: usize, page: usize, way: usize) -> (usize, usize) {
 impl Ahead {
     /// With so many bytes free; a page takes `page` at most, and `way` while it is made.
     pub(super) fn new(source: Option<Shared>, free: usize, page: usize, way: usize) -> Ahead {
-        let room = (free / PART).max((free / MORE).min(way + FEW * page));
+        let few = (free / MORE).min(way + FEW * page);
+        let mut ahead = Ahead::within(source, (free / PART).max(few), page, way);
+        ahead.least = if few > free / PART { Some(free / PART) } else { None };
+        ahead
+    }
+
+    /// The bytes that would be set aside at least, if more are.
+    pub(super) fn least(&self) -> Option<usize> {
+        self.least
+    }
+
+    /// With so much room.
+    pub(super) fn within(source: Option<Shared>, room: usize, page: usize, way: usize) -> Ahead {
         let (most, at_once) = shares(room, page, way);
         let line = source.filter(|_| most > 0);
         let (most, room) = if line.is_some() { (most, most * page + at_once * way) } else { (0, 0) };
         let line = line.map(|source| Arc::new(Line { source, waiting: Mutex::default(), at_once }));
-        Ahead { line, jobs: Vec::new(), most, room }
+        Ahead { line, jobs: Vec::new(), most, room, least: None }
     }
 
     /// Bytes set aside.

@@ -279,7 +279,7 @@ impl Drawing {
 
     /// Bytes held, strokes that may wait included.
     pub(super) fn bytes(&self) -> usize {
-        let strokes = (self.waiting + 2) * HANDFUL * size_of::<Stroke>();
+        let strokes = (self.waiting + 3) * HANDFUL * size_of::<Stroke>();
         let faces = self.away.as_ref().map_or_else(|| self.canvas.bytes(), |a| a.1);
         faces + strokes + 4 * self.log.capacity()
     }

@@ -101,6 +101,9 @@ impl List {
         self.soon.shrink_to(there);
         self.near.shrink_to(near_of(there));
         self.ready.shrink_to(there);
+        if self.soon.len() + self.near.len() > self.ready.capacity() {
+            self.forget();
+        }
     }
 
     /// What [`List::reserve_to`] takes beside what is held: more bytes in all, and those of the largest array that is there until its new one is filled.

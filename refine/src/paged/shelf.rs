@@ -327,8 +327,20 @@ impl<S: ByteRanges> Shelf<S> {
 
     /// Of so many bytes that are free sets some aside for pages that are made ahead, if there are enough.
     pub(super) fn set_aside(&mut self, free: usize) {
-        let most = self.chunks.iter().map(|c| c.most).max().unwrap_or(0);
-        self.ahead = Ahead::new(self.reader.source().shared(), free, most, self.scratch);
+        self.ahead = Ahead::new(self.reader.source().shared(), free, self.most_of_a_page(), self.scratch);
+    }
+
+    /// What is shown finds no room: no more is set aside than must be.
+    pub(super) fn set_aside_least(&mut self) {
+        if let Some(room) = self.ahead.least() {
+            let (source, most) = (self.reader.source().shared(), self.most_of_a_page());
+            self.ahead = Ahead::within(source, room, most, self.scratch);
+        }
+    }
+
+    /// Bytes.
+    fn most_of_a_page(&self) -> usize {
+        self.chunks.iter().map(|c| c.most).max().unwrap_or(0)
     }
 
     /// A frame begins.
