@@ -71,6 +71,8 @@ struct Frame<'a> {
     full: bool,
     /// Both lists were looked through from their ends, not from where the last frame was cut short.
     whole: bool,
+    /// No limit makes it matter what comes first.
+    unlimited: bool,
     /// See [`PagedView::adapt_in_waves`].
     waves: bool,
 }
@@ -143,12 +145,18 @@ impl<S: ByteRanges> PagedView<S> {
     /// Errors: damage, the source's. The mesh is sound then, and closed, somewhere on the way.
     pub fn adapt(&mut self, lenses: &[Lens], limits: &PagedLimits<'_>) -> Result<PagedDone, PagedError> {
         let meter = Meter::new(&limits.limits);
+        let all = &limits.limits;
+        let unlimited = all.faces == usize::MAX
+            && all.operations == usize::MAX
+            && all.expired.is_none()
+            && limits.fetches == usize::MAX;
         let mut frame = Frame {
             meter,
             fetches: limits.fetches,
             all: PagedDone::default(),
             full: false,
             whole: true,
+            unlimited,
             waves: false,
         };
         let first = !self.begun;
@@ -189,13 +197,8 @@ impl<S: ByteRanges> PagedView<S> {
             self.shelf.foresee(|e| clock.will_want(e));
         }
         let mut desk = Desk::new(&judges, &self.clock);
-        let limits = &frame.meter.limits;
-        let unlimited = limits.faces == usize::MAX
-            && limits.operations == usize::MAX
-            && limits.expired.is_none()
-            && frame.fetches == usize::MAX;
         // In the first frame it shows how much is needed.
-        if unlimited && !all && !self.short && self.motions.is_none() && self.is_roomy() {
+        if frame.unlimited && !all && !self.short && self.motions.is_none() && self.is_roomy() {
             frame.waves = true;
             return self.adapt_in_waves(&mut desk, frame);
         }
@@ -404,9 +407,9 @@ impl<S: ByteRanges> PagedView<S> {
     fn apply_queue(&mut self, desk: &mut Desk<'_>, frame: &mut Frame<'_>) -> Result<(), PagedError> {
         let mut lot = Vec::with_capacity(LOT);
         while self.queue.len() > 0 {
-            // A lot; of one rank, as a limit of the frame may make it matter which come first. (Of memory: by lots.)
+            // A lot; of one rank, where a limit of the frame makes it matter which come first. (Of memory: by lots.)
             lot.clear();
-            let rank = self.queue.rank();
+            let rank = self.queue.rank().filter(|_| !frame.unlimited);
             while lot.len() < LOT
                 && let Some(i) = self.queue.pop(rank)
             {
