@@ -152,6 +152,23 @@ fn both(_: bool, a: impl FnOnce(), b: impl FnOnce()) {
     b();
 }
 
+/// There are other threads.
+fn several() -> bool {
+    #[cfg(feature = "parallel")]
+    return rayon::current_num_threads() > 1;
+    #[cfg(not(feature = "parallel"))]
+    return false;
+}
+
+/// Has something done by whoever is free. Without threads nobody ever is.
+#[cfg(feature = "parallel")]
+fn begin(work: impl FnOnce() + Send + 'static) {
+    rayon::spawn(work);
+}
+
+#[cfg(not(feature = "parallel"))]
+fn begin(_: impl FnOnce() + Send + 'static) {}
+
 impl<S: ByteRanges> PagedView<S> {
     /// A view that shows the base of mesh `m`, and holds at most `limit` bytes. Reads the base and what stands beside it.
     ///
@@ -473,20 +490,17 @@ impl<S: ByteRanges> PagedView<S> {
 
     /// Of what arrays have grown ahead, all but the least that they grow by. Returns the bytes that were freed.
     fn give_back(&mut self) -> usize {
-        fn shrink<T>(v: &mut Vec<T>, to: usize) {
-            v.shrink_to(to);
-        }
         self.drawing.gather();
         let before = self.bytes();
         let some = |n: usize| n + n / LEAST_AHEAD;
         let [_, there, open_there] = self.needed_room(0).map(some);
         let records = some(self.shelf.pool.of.len());
         let (places, slots) = self.places(records);
-        shrink(&mut self.shelf.pool.of, records);
+        self.shelf.pool.of.shrink_to(records);
         let canvas = &mut self.drawing.canvas;
-        shrink(&mut canvas.fans.corners, slots);
-        shrink(&mut canvas.fans.links, slots);
-        shrink(&mut canvas.touched, slots.div_ceil(64));
+        canvas.fans.corners.shrink_to(slots);
+        canvas.fans.links.shrink_to(slots);
+        canvas.touched.shrink_to(slots.div_ceil(64));
         self.open.shrink_to([places, open_there]);
         self.last.shrink_to([records, there]);
         before - self.bytes()

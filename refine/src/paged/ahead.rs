@@ -3,9 +3,9 @@
 //! What is shown does not depend on it: a page that was made ahead stands beside the shelf until it is asked for, in room that is set aside for that from the beginning, whatever the number of threads, and then comes onto
 //! the shelf as one that is fetched does. If nobody has begun with it by then it is made on the spot; if somebody has, that is waited for.
 
-use super::PagedError;
 use super::page::Page;
 use super::shelf::{OnWay, read_page};
+use super::{PagedError, begin, several};
 use crate::format::{ByteRanges, MeshHead};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -220,14 +220,8 @@ impl Ahead {
     }
 
     /// There are threads for it, and there is room.
-    #[cfg(feature = "parallel")]
     pub(super) fn works(&self) -> bool {
-        self.most > 0 && rayon::current_num_threads() > 1
-    }
-
-    #[cfg(not(feature = "parallel"))]
-    pub(super) fn works(&self) -> bool {
-        false
+        self.most > 0 && several()
     }
 
     /// Has the page of a chunk, which is not on the shelf, made by somebody, if there is room, soon if it is needed `now`; says whether it is, or will be.
@@ -277,14 +271,6 @@ impl Ahead {
         made
     }
 }
-
-#[cfg(feature = "parallel")]
-fn begin(work: impl FnOnce() + Send + 'static) {
-    rayon::spawn(work);
-}
-
-#[cfg(not(feature = "parallel"))]
-fn begin(_: impl FnOnce() + Send + 'static) {}
 
 #[cfg(all(test, feature = "parallel"))]
 mod tests {

@@ -4,6 +4,7 @@
 //! at a time; so faces are the same for any number of threads. A stroke that contradicts the faces changes nothing, and ends it: those behind it are not drawn, and the view takes back what was asked for by them.
 
 use super::ready::{LOT, Reads};
+use super::{begin, several};
 use crate::aif::NONE;
 use crate::progressive::{Damage, Fans, Half, NO_ENTRY, SplitCode};
 use crate::selective::{Known, Sheet, split, unsplit};
@@ -252,7 +253,7 @@ impl Easel {
 }
 
 /// The faces, and strokes that are not drawn yet.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Drawing {
     /// Between frames, and where they are drawn by the view itself, the faces are here.
     pub(super) canvas: Canvas,
@@ -364,21 +365,3 @@ impl Drawing {
         result
     }
 }
-
-#[cfg(feature = "parallel")]
-fn several() -> bool {
-    rayon::current_num_threads() > 1
-}
-
-#[cfg(not(feature = "parallel"))]
-fn several() -> bool {
-    false
-}
-
-#[cfg(feature = "parallel")]
-fn begin(work: impl FnOnce() + Send + 'static) {
-    rayon::spawn(work);
-}
-
-#[cfg(not(feature = "parallel"))]
-fn begin(_: impl FnOnce() + Send + 'static) {}
