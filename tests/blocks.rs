@@ -142,9 +142,15 @@ fn bounds_hold_what_is_below(pm: &ProgressiveMesh) {
 
 #[test]
 fn written_block_by_block_it_is_the_same_terrain() {
-    for (spacing, hole, floor) in [([1.0; 2], false, 0.0), ([4.0, 6.0], true, 0.0), ([1.0; 2], true, 3.0)] {
-        let grid = landscape(75, 50, hole);
-        let options = Options::default().with_cells(8).with_spacing(spacing).with_floor(floor);
+    // The last in blocks of which the tops are apart.
+    for (size, cells, spacing, hole, floor) in [
+        ((75, 50), 8, [1.0; 2], false, 0.0),
+        ((75, 50), 8, [4.0, 6.0], true, 0.0),
+        ((75, 50), 8, [1.0; 2], true, 3.0),
+        ((120, 85), 64, [1.0; 2], true, 0.0),
+    ] {
+        let grid = landscape(size.0, size.1, hole);
+        let options = Options::default().with_cells(cells).with_spacing(spacing).with_floor(floor);
         let built = build(&grid, &options, &InMemory::default(), &Quiet).unwrap();
         let store = InMemory::default();
         let bytes = file(&grid, &options, &store);
@@ -186,10 +192,42 @@ fn written_block_by_block_it_is_the_same_terrain() {
     }
 }
 
+/// Of a large block; a small one has one chunk.
+#[test]
+fn the_largest_errors_of_a_block_have_a_chunk_of_their_own() {
+    for (side, chunks) in [(60, 1), (90, 2)] {
+        let grid = landscape(side, side, false);
+        let bytes = file(&grid, &Options::default().with_cells(128), &InMemory::default());
+        let reader = RangeReader::new(&bytes[..]).unwrap();
+        let (head, _) = reader.base(0).unwrap();
+        let all: Vec<_> =
+            reader.directory().chunks.iter().filter(|c| c.kind == ChunkType::SPLITS).copied().collect();
+        assert_eq!(all.len(), chunks);
+        let errors = |k: usize| {
+            let Piece::Splits(block) = reader.read(all[k].index, Some(&head)).unwrap() else { panic!() };
+            let mut errors = block.splits.error;
+            errors.sort_by(f32::total_cmp);
+            errors
+        };
+        if let [top, others] = &all[..] {
+            // With what they depend on, which may have any.
+            assert!(top.count > others.count / 30 && top.count < others.count / 5, "{top:?} {others:?}");
+            let (of_top, of_others) = (errors(0), errors(1));
+            let greatest = of_others[of_others.len() - 1];
+            assert!(greatest < top.error && of_top[of_top.len() / 2] >= greatest);
+        }
+    }
+}
+
 #[test]
 fn what_is_written_block_by_block_is_refined_out_of_core_as_in_memory() {
-    let grid = landscape(60, 60, true);
-    let bytes = file(&grid, &Options::default().with_cells(8), &InMemory::default());
+    refined_as_in_memory(60, 8);
+    refined_as_in_memory(100, 64);
+}
+
+fn refined_as_in_memory(side: usize, cells: usize) {
+    let grid = landscape(side, side, true);
+    let bytes = file(&grid, &Options::default().with_cells(cells), &InMemory::default());
     let mesh = decode(&bytes).unwrap().meshes.remove(0);
     let h = Arc::new(Hierarchy::new(Arc::new(mesh), &hierarchy::Options::CUTS.with_rounds(0)).unwrap());
     let (centre, diagonal) = h.extent();
@@ -215,7 +253,7 @@ fn what_is_written_block_by_block_is_refined_out_of_core_as_in_memory() {
         let found = paged.adapt(&[lens], &PagedLimits::default()).unwrap().done;
         assert!(done.complete && (found.splits, found.collapses) == (done.splits, done.collapses));
         assert_eq!((view.face_count(), view.vertex_count()), (paged.face_count(), paged.vertex_count()));
-        assert!(view.face_count() > 50 && view.face_count() < 2 * 59 * 59);
+        assert!(view.face_count() > 50 && view.face_count() < 2 * (side - 1).pow(2));
     }
 }
 

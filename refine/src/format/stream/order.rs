@@ -1,10 +1,19 @@
-//! The order of the splits of a part, and how they are divided into chunks: runs of subtrees, near each other in space.
+//! The order of the splits of a part, and how they are divided into chunks: runs of subtrees, near each other in space; in a large part those of the largest errors first, apart.
+//!
+//! A view needs a chunk as soon as it needs one of its splits, and errors have long tails: the largest of a block of rough terrain are twenty times as large as half of them. So where the tops stand among the others, half of the chunks that a flight needs are needed for
+//! less than one in a hundred of their splits.
 
 use super::super::plan::Curve;
 use super::part::Open;
 use super::{Next, Path, PathSplits, Vertex};
 use crate::aif::{NONE, Positions};
 use crate::progressive::ProgressiveMesh;
+
+/// Of a part of at least so many splits the tops have chunks of their own: those of smaller parts would repeat more than they hold.
+const LARGE: usize = 4096;
+/// One in so many splits is a top, but for what they depend on. Over generated terrain of 4,097 x 4,097 the fast lemniscate takes 687,000 splits of chunks with 20, 661,000 with 10 or 5 and 1,239,000 without tops; files are 9, 13, 19 and 0 % larger. With tops of two
+/// kinds, one in 30 and one in 6, it takes 561,000, of files 22 % larger, and with a half or a quarter of the other splits to a chunk 605,000 and 550,000: in no less time.
+const ONE_IN: usize = 20;
 
 /// A part's splits on the way into the order of the file. Splits are named by their place in the part as it was given; on the path they come as `first + place`.
 #[derive(Clone, Debug, Default)]
@@ -90,8 +99,26 @@ impl Path<'_> {
             .map(|(&v, t)| (u64::from(curve.at(place(v).to_array())) << 32 | u64::from(v), t))
             .collect();
         keys.sort_unstable();
-        let aim = m.div_ceil(m.div_ceil(self.tree.chunk).max(1)).max(1);
-        let (mut rest, mut waiting) = (&keys[..], vec![]);
+        let is_top = tops(&part.splits.error, &order.on, first);
+        let (top, others): (Vec<_>, Vec<_>) = keys.iter().partition(|k| is_top[k.1 as usize]);
+        for keys in [top, others] {
+            self.divide(part, &mut order, &keys, file, open)?;
+        }
+        Some(order)
+    }
+
+    /// Appends splits, with the keys by which they lie side by side, in chunks. What they depend on is there, or among them. `None` if not.
+    fn divide(
+        &mut self,
+        part: &PathSplits,
+        order: &mut Order,
+        keys: &[(u64, u32)],
+        file: u32,
+        open: &mut Open,
+    ) -> Option<()> {
+        let n = keys.len();
+        let aim = n.div_ceil(n.div_ceil(self.tree.chunk).max(1)).max(1);
+        let (mut rest, mut waiting) = (keys, vec![]);
         while !rest.is_empty() || !waiting.is_empty() {
             let mut end = aim.min(rest.len());
             while end > 0 && end < rest.len() && rest[end].0 == rest[end - 1].0 {
@@ -105,7 +132,7 @@ impl Path<'_> {
             rest = others;
             waiting.extend(run.iter().map(|k| k.1));
             let before = order.order.len();
-            waiting = self.add(part, &mut order, waiting, file, open);
+            waiting = self.add(part, order, waiting, file, open);
             let count = order.order.len() - before;
             if count > 0 {
                 order.counts.push(count);
@@ -113,7 +140,7 @@ impl Path<'_> {
                 return None;
             }
         }
-        Some(order)
+        Some(())
     }
 
     /// Appends those candidates that can come now, as a chunk, in sweeps over its vertices; returns the others.
@@ -208,4 +235,24 @@ impl Path<'_> {
         (at.last, at.node) = (split, node);
         self.vertices.push(Vertex { label, behind, last: split, node: node + 1, next: Next::NOTHING });
     }
+}
+
+/// Of many splits the tops, and what they depend on: those from `first` on are these.
+fn tops(errors: &[f32], on: &[[u32; 3]], first: u32) -> Vec<bool> {
+    let m = errors.len();
+    let mut is_top = vec![false; m];
+    if m < LARGE {
+        return is_top;
+    }
+    let mut all = errors.to_vec();
+    let (_, &mut most, _) = all.select_nth_unstable_by(m - m / ONE_IN, f32::total_cmp);
+    for t in (0..m).rev() {
+        is_top[t] |= errors[t] > most;
+        if is_top[t] {
+            for k in on[t].iter().filter(|d| **d != NONE).filter_map(|d| d.checked_sub(first)) {
+                is_top[k as usize] = true;
+            }
+        }
+    }
+    is_top
 }
