@@ -98,12 +98,13 @@ impl Nibble {
     #[inline(always)]
     pub(super) fn find(&self, slot: u32) -> usize {
         let slot = slot as i16;
-        // Halving: less than what it takes to add up what vectors compare.
-        let begins = |k: usize| (self.start[k & 15] <= slot) as usize;
-        let mut k = begins(8) << 3;
-        k |= begins(k | 4) << 2;
-        k |= begins(k | 2) << 1;
-        k | begins(k | 1)
+        // Compared at once, and counted: half the time of halving, where each step waits for the one before.
+        let mut begun = [0; 16];
+        for (begun, start) in begun.iter_mut().zip(&self.start) {
+            *begun = u8::from(*start <= slot);
+        }
+        let begun = begun.iter().fold(0u8, |sum, &b| sum.wrapping_add(b));
+        usize::from(begun).wrapping_sub(1) & 15
     }
 
     /// Every start moves towards where it were if only `symbol` came and all others kept a share of 1; fast at first.
