@@ -19,6 +19,7 @@
 
 mod adapt;
 mod ahead;
+mod calendar;
 mod canvas;
 mod front;
 mod list;

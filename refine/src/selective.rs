@@ -40,7 +40,7 @@ pub(crate) use adapt::Meter;
 pub use adapt::{Done, Limits};
 pub use changes::Changes;
 pub(crate) use changes::take_runs;
-pub(crate) use clock::{Clock, Clocks, Due, Judges, Looked, Many, Sums};
+pub(crate) use clock::{Clock, Clocks, Due, Judges, Looked, Many, Paces, Sums};
 pub(crate) use cut::{Cut, morphed};
 pub(crate) use entry::Entry;
 pub(crate) use front::Front;

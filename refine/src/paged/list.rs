@@ -1,20 +1,15 @@
 //! Splits that could be made or undone next, and when to look at them: the times apart, as most frames look at few of many.
 //!
-//! Entries have places that are told by what they are of, and stay there while they are not to be asked: so nothing is moved, or looked for. Few frames ask all times. From time to time all are, for those that
-//! may come before a *horizon*, some frames like the last from now; until lenses have passed that, frames ask these alone. Of these in turn, those before a nearer horizon are asked in every frame and the others in few.
+//! Entries have places that are told by what they are of, and stay there while they are not to be asked: so nothing is moved, or looked for. Few frames ask all times: a [`Calendar`] has those that come within some frames.
 
 use super::both;
+use super::calendar::Calendar;
 use super::ready::LOT;
 use crate::selective::{Clocks, Due, Entry, Looked, Many, Sums};
 
-/// Frames to the horizon, at most.
-const FRAMES: f64 = 32.0;
-/// Frames to the nearer one: slow circles over generated terrain of 4,097 x 4,097 take a seventh less with it than without, fast ones a twentieth to a tenth. Other numbers were not tried.
-const NEAR: f64 = 4.0;
-
 /// Bytes of a place, and of an entry that is there, at most.
 pub(super) const PLACE: usize = size_of::<Entry>() + size_of::<Due>() + 1;
-pub(super) const THERE: usize = 2 * size_of::<(u32, Due)>() + size_of::<u32>();
+pub(super) const THERE: usize = Calendar::EACH + size_of::<u32>();
 
 /// More bytes that an array of such a capacity takes with room for so many, and those of the old one while it is filled.
 pub(super) fn grown<T>(capacity: usize, to: usize) -> [usize; 2] {
@@ -22,11 +17,6 @@ pub(super) fn grown<T>(capacity: usize, to: usize) -> [usize; 2] {
         None | Some(0) => [0; 2],
         Some(more) => [more * size_of::<T>(), capacity * size_of::<T>()],
     }
-}
-
-/// Of so many entries, those that there is room for before the nearer horizon. Where more are due so soon, frames ask all that are before the other.
-fn near_of(there: usize) -> usize {
-    there.div_ceil(4)
 }
 
 /// What is to be done about something that was looked at.
@@ -52,12 +42,8 @@ pub(super) struct List {
     of: Vec<Entry>,
     /// What is not there is never due.
     due: Vec<Due>,
-    /// Places that are due before the horizon, and when. What has been told otherwise since is still there, and left out when it comes.
-    soon: Vec<(u32, Due)>,
-    horizon: Option<Sums>,
-    /// Those of them that are due before the nearer horizon.
-    near: Vec<(u32, Due)>,
-    near_horizon: Option<Sums>,
+    /// Places that are due within some frames.
+    calendar: Calendar,
     /// Places that are due in this frame, ascending; some may have been taken out since.
     ready: Vec<u32>,
     /// So many were due when that was found out last.
@@ -69,13 +55,13 @@ pub(super) struct List {
 impl List {
     /// Places, and entries that can be there at once.
     pub(super) fn capacity(&self) -> [usize; 2] {
-        [self.of.capacity().min(self.due.capacity()), self.soon.capacity().min(self.ready.capacity())]
+        [self.of.capacity().min(self.due.capacity()), self.calendar.capacity().min(self.ready.capacity())]
     }
 
     pub(super) fn bytes(&self) -> usize {
         size_of::<Entry>() * self.of.capacity()
             + size_of::<Due>() * self.due.capacity()
-            + size_of::<(u32, Due)>() * (self.soon.capacity() + self.near.capacity())
+            + self.calendar.bytes()
             + size_of::<u32>() * self.ready.capacity()
             + size_of::<u64>() * self.sorting.capacity()
     }
@@ -88,8 +74,7 @@ impl List {
         grow(&mut self.of, places);
         grow(&mut self.due, places);
         grow(&mut self.sorting, places.div_ceil(64));
-        grow(&mut self.soon, there);
-        grow(&mut self.near, near_of(there));
+        self.calendar.reserve_to(there);
         grow(&mut self.ready, there);
     }
 
@@ -98,23 +83,20 @@ impl List {
         self.of.shrink_to(places);
         self.due.shrink_to(places);
         self.sorting.shrink_to(places.div_ceil(64));
-        self.soon.shrink_to(there);
-        self.near.shrink_to(near_of(there));
+        self.calendar.shrink_to(there);
         self.ready.shrink_to(there);
-        if self.soon.len() + self.near.len() > self.ready.capacity() {
-            self.forget();
-        }
     }
 
     /// What [`List::reserve_to`] takes beside what is held: more bytes in all, and those of the largest array that is there until its new one is filled.
     pub(super) fn growth(&self, [places, there]: [usize; 2]) -> [usize; 2] {
         let sorting = self.sorting.capacity();
+        let [told, sheets] = self.calendar.room(there);
         let all = [
             grown::<Entry>(self.of.capacity(), places),
             grown::<Due>(self.due.capacity(), places),
             grown::<u64>(sorting, places.div_ceil(64)),
-            grown::<(u32, Due)>(self.soon.capacity(), there),
-            grown::<(u32, Due)>(self.near.capacity(), near_of(there)),
+            grown::<(u32, Due)>(told[0], told[1]),
+            grown::<u32>(sheets[0], sheets[1]),
             grown::<u32>(self.ready.capacity(), there),
         ];
         all.iter().fold([0; 2], |sum, g| [sum[0] + g[0], sum[1].max(g[1])])
@@ -185,65 +167,37 @@ impl List {
     pub(super) fn set_due(&mut self, at: u32, due: Due) {
         let Some(d) = self.due.get_mut(at as usize) else { return };
         *d = due;
-        if !self.horizon.is_some_and(|h| h.have_reached(due)) {
-            return;
-        }
-        // More than there is room for: then all are asked again.
-        if self.soon.len() + self.near.len() >= self.soon.capacity().min(self.ready.capacity()) {
-            return self.forget();
-        }
-        if self.near_horizon.is_some_and(|h| h.have_reached(due)) {
-            if self.near.len() < self.near.capacity() {
-                return self.near.push((at, due));
-            }
-            self.near_horizon = None;
-        }
-        self.soon.push((at, due));
+        self.calendar.tell(at, due);
     }
 
     /// Begins a frame: finds the places that are due; `all`: those of all entries. Returns how many there are.
     pub(super) fn begin(&mut self, all: bool, clock: &Clocks) -> usize {
         let now = clock.sums();
+        self.ready.clear();
         if all {
-            self.forget();
-            self.ready.clear();
+            self.calendar.forget();
             let there = (0..).zip(&self.due).filter(|(_, d)| **d != Due::NEVER).map(|(at, _)| at);
             self.ready.extend(there);
-            self.were_due = self.ready.len();
-            return self.were_due;
-        }
-        match self.horizon.filter(|h| h.include(now)) {
-            Some(_) => self.ask_soon(now, clock),
-            None => {
-                // So many that asking all, shared by the frames to the horizon, takes as long as asking those that come before it.
-                let frames = self.of.len() as f64 / self.were_due.max(1) as f64;
-                self.forget();
-                let horizon = clock.horizon(frames.sqrt().clamp(1.0, FRAMES));
-                self.ask_all(now, horizon);
-                self.horizon = Some(horizon);
-            }
+        } else if self.calendar.includes(now) {
+            self.ask_calendar(now);
+        } else {
+            self.ask_all(now, clock);
         }
         self.were_due = self.ready.len();
         self.were_due
     }
 
-    fn forget(&mut self) {
-        (self.horizon, self.near_horizon) = (None, None);
-        self.soon.clear();
-        self.near.clear();
-    }
-
-    /// Most do not come before the horizon: asked without a branch for each.
-    fn ask_all(&mut self, now: Sums, horizon: Sums) {
-        self.ready.clear();
+    /// Begins a calendar. What does not stand in it is asked without a branch for each.
+    fn ask_all(&mut self, now: Sums, clock: &Clocks) {
+        let end = self.calendar.begin(clock);
         let mut first = 0;
         for block in self.due.chunks(16) {
-            if block.iter().fold(false, |any, &d| any | horizon.have_reached(d)) {
+            if block.iter().fold(false, |any, &d| any | end.have_reached(d)) {
                 for (at, &d) in (first..).zip(block) {
                     if now.have_reached(d) {
                         self.ready.push(at);
-                    } else if horizon.have_reached(d) {
-                        self.soon.push((at, d));
+                    } else if end.have_reached(d) {
+                        self.calendar.tell(at, d);
                     }
                 }
             }
@@ -251,35 +205,9 @@ impl List {
         }
     }
 
-    fn ask_soon(&mut self, now: Sums, clock: &Clocks) {
-        self.ready.clear();
+    fn ask_calendar(&mut self, now: Sums) {
         let (due, ready) = (&self.due, &mut self.ready);
-        let mut is_waiting = |&(at, told): &(u32, Due)| {
-            let is_due = now.have_reached(told);
-            // It may have been told otherwise, or be of another entry, since.
-            if is_due && due.get(at as usize) == Some(&told) {
-                ready.push(at);
-            }
-            !is_due
-        };
-        self.near.retain(&mut is_waiting);
-        if !self.near_horizon.is_some_and(|h| h.include(now)) {
-            let (horizon, near) = (clock.horizon(NEAR), &mut self.near);
-            let mut whole = true;
-            self.soon.retain(|s| {
-                if !is_waiting(s) {
-                    return false;
-                }
-                let is_near = horizon.have_reached(s.1);
-                let has_room = near.len() < near.capacity();
-                whole &= !is_near || has_room;
-                if is_near && has_room {
-                    near.push(*s);
-                }
-                !(is_near && has_room)
-            });
-            self.near_horizon = whole.then_some(horizon);
-        }
+        self.calendar.ask(now, |at| due.get(at as usize).copied().unwrap_or(Due::NEVER), ready);
         // Each once, though it was put there, or told, more than once since.
         ready.iter().for_each(|&at| self.sorting[at as usize / 64] |= 1 << (at % 64));
         ready.clear();
@@ -375,12 +303,12 @@ mod tests {
     /// On a flight that goes faster, stands and turns, while entries come and go, what is found to be due is what is when all are asked.
     #[test]
     fn what_is_due_is_found() {
-        for room in [150, 12] {
+        for room in [2100, 10] {
             what_is_due_is_found_with(room);
         }
     }
 
-    /// With so much room before the nearer horizon.
+    /// With so much room in the calendar.
     fn what_is_due_is_found_with(room: usize) {
         let mut state = 7u64;
         let mut unit = move || {
@@ -389,13 +317,14 @@ mod tests {
         };
         let mut vector = move || DVec3::new(unit(), unit(), 0.1 * unit()) - DVec3::new(0.5, 0.5, 0.0);
         let (mut clock, mut list) = (Clocks::new(1.4), List::default());
-        list.reserve_to([600; 2]);
-        list.extend_to(500);
-        list.near = Vec::with_capacity(room);
+        list.reserve_to([2100; 2]);
+        list.extend_to(2000);
+        list.calendar = Calendar::default();
+        list.calendar.reserve_to(room);
         // When each place was told to be due.
         let mut told: BTreeMap<u32, Due> = BTreeMap::new();
         let (mut eye, mut angle, mut splits) = (DVec3::new(-0.4, 0.0, 0.05), 0.0f64, 0);
-        let (mut found_soon, mut all_found, mut near, mut full) = (0, 0, 0, 0);
+        let (mut found_soon, mut all_found, mut known, mut full) = (0, 0, 0, 0);
         for frame in 0..300 {
             let speed = [0.0, 1e-4, 1e-3, 4e-3][frame / 10 % 4];
             angle += [0.0, 0.0, 2e-3][frame / 7 % 3];
@@ -415,9 +344,13 @@ mod tests {
             let lens = [lens.unwrap()];
             let judges = Judges::new(&lens, 1.0);
             let stands = clock.go_on(&judges);
-            let soon = list.horizon.is_some_and(|h| h.include(clock.sums()));
-            near += usize::from(!list.near.is_empty());
-            full += usize::from(list.near.len() == list.near.capacity());
+            let soon = list.calendar.includes(clock.sums());
+            known += usize::from(soon);
+            if frame % 50 == 49 {
+                // What is there stays, and when it is due.
+                list.shrink_to([0; 2]);
+                list.reserve_to([2100, room]);
+            }
             let count = list.begin(!stands, &clock);
             let found: Vec<u32> = (0..count).filter_map(|k| list.ready(k)).map(|r| r.0).collect();
             let times = found.len();
@@ -430,6 +363,7 @@ mod tests {
                 found_soon += found.len();
             }
             all_found += found.len();
+            let was_known = list.calendar.includes(clock.sums());
             let asked: Vec<Entry> = found.iter().map(|&p| *list.get(p).unwrap()).collect();
             let mut looked = Looked::default();
             clock.look(&clock.next(&judges), &asked, &mut looked);
@@ -437,13 +371,14 @@ mod tests {
                 list.set_due(place, due);
                 told.insert(place, due);
             }
+            full += usize::from(was_known && !list.calendar.includes(clock.sums()));
             let gone: Vec<u32> =
                 told.keys().copied().filter(|p| (p + frame as u32).is_multiple_of(97)).collect();
             for p in gone {
                 list.take_out(p);
                 told.remove(&p);
             }
-            for place in 0..500 {
+            for place in 0..2000 {
                 if told.contains_key(&place) {
                     continue;
                 }
@@ -460,8 +395,8 @@ mod tests {
                 splits += 1;
             }
         }
-        assert!(found_soon > 1000 && all_found < 300 * 250, "{found_soon} of {all_found}");
-        assert!(near > 100 && (room > 100 || full > 20), "{near} {full}");
+        assert!(found_soon > 1000 && all_found < 300 * 1000, "{found_soon} of {all_found}");
+        assert!(known > 100 && (full > 4) == (room < 100), "{known} {full}");
     }
 
     /// Few and many, by one thread and by several: what is marked is what is needed, and of the others is noted when they are due, as if each was looked at alone.

@@ -13,7 +13,7 @@
 mod near;
 
 pub(super) use near::Now;
-pub(crate) use near::{Clocks, Due, Looked, Sums};
+pub(crate) use near::{Clocks, Due, Looked, Paces, Sums};
 
 use super::Lens;
 use super::entry::Entry;

@@ -131,6 +131,11 @@ impl Clocks {
         Sums { moved: on(self.moved, self.step[0]), turned: on(self.turned, self.step[1]) }
     }
 
+    /// What a frame like the last adds to the sums.
+    pub(crate) fn paces(&self) -> Paces {
+        Paces { from: self.sums(), step: self.step.map(|s| s as f32) }
+    }
+
     /// How slack is measured.
     fn pace(&self) -> Pace {
         let pace = self.all.pace;
@@ -253,6 +258,25 @@ impl Sums {
     /// Others are no farther on in either way: then what has not come by these has not come by those, as rounding keeps the order.
     pub(crate) fn include(self, others: Sums) -> bool {
         others.moved <= self.moved && others.turned <= self.turned
+    }
+}
+
+/// Sums, and what a frame adds to them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Paces {
+    from: Sums,
+    step: [f32; 2],
+}
+
+impl Paces {
+    /// The first of so many frames like that at which something is due, `most` if none is; by rounding another at times. Of what is due by now the first.
+    #[inline(always)]
+    pub(crate) fn frames_to(&self, due: Due, most: usize) -> usize {
+        let Sums { moved, turned } = self.from;
+        let left = due.until - (moved + due.away * turned);
+        // What is no number, without a step, is due.
+        let frames = left / (self.step[0] + due.away * self.step[1]) + 1.0;
+        if left > 0.0 { frames.min(most as f32) as usize } else { 0 }
     }
 }
 
