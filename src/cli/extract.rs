@@ -8,7 +8,7 @@ use super::common::{self, Warnings, short, thousands};
 use super::control::{Interrupt, Progress};
 use super::ending::Ending;
 use super::method::Making;
-use super::paging::Paging;
+use super::paging::{self, Paging};
 use super::rule::{Guard, RuleArgs};
 use super::{Failure, camera};
 use clap::ValueEnum;
@@ -68,7 +68,7 @@ pub(crate) struct Needs {
     /// What to leave coarse however near it is
     #[arg(long, value_enum, default_value_t = CullName::All, help_heading = "View")]
     cull: CullName,
-    /// Read of a .pm only what is needed, and take at most so many MiB, the program and a grid's cache included: for files of any size, made by encode --paged or terrain build
+    /// Read of a .pm only what is needed, and take at most so many MiB, the program and a grid's cache included: for files of any size, made by encode --paged or terrain build [default: 1024 for terrain of 64 MiB or more; of all else all is read]
     #[arg(long, value_name = "MIB", value_parser = args::positive, allow_negative_numbers = true, help_heading = "View")]
     pub(crate) memory: Option<usize>,
     #[command(flatten)]
@@ -88,6 +88,11 @@ enum CullName {
 }
 
 impl Needs {
+    /// Where no limit of memory was given, that of an input which has one of its own.
+    pub(crate) fn limit_memory(&mut self, input: &Input) {
+        self.memory = self.memory.or_else(|| paging::unasked(input, &self.rule));
+    }
+
     pub(crate) fn cull(&self) -> Cull {
         match self.cull {
             CullName::None => Cull::None,
@@ -159,8 +164,9 @@ pub(crate) fn make(
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(mut self) -> Result<(), Failure> {
         let start = Instant::now();
+        self.needs.limit_memory(&self.input);
         self.needs.rule.check(self.needs.memory.is_some())?;
         let mut results = self.ending.begin()?;
         let camera = camera::read(&self.camera, &mut results.warnings)?;

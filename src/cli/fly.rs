@@ -119,9 +119,10 @@ fn hysteresis(text: &str) -> Result<f64, String> {
 }
 
 impl Args {
-    pub(crate) fn run(self) -> Result<(), Failure> {
+    pub(crate) fn run(mut self) -> Result<(), Failure> {
         let mut warnings = Warnings::new(self.quiet);
         let file = self.input.name();
+        self.needs.limit_memory(&self.input);
         // Before any work is done.
         let source = self.path.open(self.needs.memory, &mut warnings)?;
         self.needs.rule.check(self.needs.memory.is_some())?;

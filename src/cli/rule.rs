@@ -71,6 +71,11 @@ impl RuleArgs {
         }
     }
 
+    /// None was asked for, nor that errors count otherwise than by their length.
+    pub(crate) fn is_any(&self) -> bool {
+        self.rule.is_none() && !self.is_directional()
+    }
+
     pub(crate) fn is_truly(&self) -> bool {
         self.rule == Some(RuleName::Truly)
     }
