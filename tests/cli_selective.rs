@@ -60,6 +60,11 @@ fn one_view_takes_fewer_faces_than_all_of_it_and_a_budget_is_kept() {
     p.done("extract in.ply b.ply --camera cam.json --threads 3 -q --png shot.png");
     assert!(p.read("a.ply") == p.read("b.ply"));
     assert_eq!(&p.read("shot.png")[1..4], b"PNG");
+    // And from what can be read but once.
+    let args = ["extract", "-", "d.ply", "--from", "pm", "--camera", "cam.json", "-q"];
+    assert!(p.command().args(args).write_stdin(p.read("in.pm")).output().unwrap().status.success());
+    p.done("extract in.pm c.ply --camera cam.json -q");
+    assert!(p.read("c.ply") == p.read("d.ply"));
 }
 
 #[test]

@@ -68,7 +68,7 @@ pub(crate) struct Needs {
     /// What to leave coarse however near it is
     #[arg(long, value_enum, default_value_t = CullName::All, help_heading = "View")]
     cull: CullName,
-    /// Read of a .pm only what is needed, and take at most so many MiB, the program and a grid's cache included: for files of any size, made by encode --paged or terrain build [default: 1024 for terrain of 64 MiB or more; of all else all is read]
+    /// Read of a .pm only what is needed, and take at most so many MiB, the program and a grid's cache included: for files of any size, made by encode --paged or terrain build [default: no limit, but so terrain of 64 MiB or more is read; of all else all]
     #[arg(long, value_name = "MIB", value_parser = args::positive, allow_negative_numbers = true, help_heading = "View")]
     pub(crate) memory: Option<usize>,
     #[command(flatten)]
@@ -88,7 +88,7 @@ enum CullName {
 }
 
 impl Needs {
-    /// Where no limit of memory was given, that of an input which has one of its own.
+    /// Where no limit of memory was given, that of an input which is read as if there were one.
     pub(crate) fn limit_memory(&mut self, input: &Input) {
         self.memory = self.memory.or_else(|| paging::unasked(input, &self.rule));
     }

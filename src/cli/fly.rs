@@ -59,7 +59,7 @@ pub(crate) struct Args {
     budget_us: Option<usize>,
     /// Begin this many frames a second at most, as a display does [default: each when the one before is done]
     ///
-    /// What other threads do in between is in no frame's time: with --memory they decode chunks that will be needed.
+    /// What other threads do in between is in no frame's time: with --memory, and of large terrain, they decode chunks that will be needed.
     #[arg(long, value_name = "N", value_parser = args::positive, allow_negative_numbers = true, help_heading = "View")]
     fps: Option<usize>,
     /// Keep what is not needed until it is not needed at this times the tolerance either, 0.1 to 1

@@ -13,7 +13,8 @@ use std::path::Path;
 /// What was read, and held: a part of the schema of `--json`.
 #[derive(Clone, Copy, Serialize)]
 pub(crate) struct Paging {
-    limit_bytes: usize,
+    /// None if there is none.
+    limit_bytes: Option<usize>,
     /// The most that was held, of what was noted.
     most_bytes: usize,
     file_bytes: u64,
@@ -37,19 +38,27 @@ pub(crate) fn grid_cache(mib: usize) -> usize {
 /// A terrain's file of so many bytes is read where it is needed though nothing was said of memory. Of 235 MB (4,097 x 4,097 samples) 100 frames of the fast lemniscate then take 0.7 s and 176 MB instead of 15 s and 2.3 GB, and less time each; the
 /// 6 MB of Grand Canyon are there in a tenth of a second, and the frames of a flight that then finds all of it take less.
 const LARGE: u64 = 64 << 20;
-/// The limit then, MiB: seldom reached at a pixel.
-const ROOMY: usize = 1024;
+/// MiB that are no limit: what is read then stays.
+const NO_LIMIT: usize = 1 << 24;
 
-/// The limit for an input of which none was given, if it has one.
+/// How many MiB an input is read with of which nothing was said, if it is one that is read where it is needed.
 pub(crate) fn unasked(input: &Input, rule: &RuleArgs) -> Option<usize> {
     of_terrain(input.progressive_path().filter(|_| rule.is_any())?, LARGE)
 }
 
-/// The limit for the file of a terrain of at least so many bytes.
+/// The same of the file of a terrain of at least so many bytes.
 fn of_terrain(path: &Path, large: u64) -> Option<usize> {
-    // What cannot be read is told by what reads it.
-    let source = files::open(path).ok().filter(|s| s.length() >= large)?;
-    pm::read_terrain(source).map(|_| ROOMY)
+    // What can be read but once is left for what reads it; what cannot be read at all that tells.
+    let is_large = |m: std::fs::Metadata| m.is_file() && m.len() >= large;
+    if files::is_dash(path) || !std::fs::metadata(path).is_ok_and(is_large) {
+        return None;
+    }
+    pm::read_terrain(files::open(path).ok()?).map(|_| NO_LIMIT)
+}
+
+/// So many MiB are a limit, and one that was given.
+pub(crate) fn is_limit(mib: usize) -> bool {
+    mib < NO_LIMIT
 }
 
 /// Opens the input, with a limit of so many MiB for the process, of which other things take `beside` bytes.
@@ -79,7 +88,7 @@ impl Paging {
     pub(crate) fn of(scene: &PagedScene, mib: usize, most_bytes: usize) -> Paging {
         let t = scene.traffic();
         Paging {
-            limit_bytes: mib.saturating_mul(1 << 20),
+            limit_bytes: is_limit(mib).then(|| mib.saturating_mul(1 << 20)),
             most_bytes,
             file_bytes: scene.file_bytes(),
             bytes_read: t.bytes_read,
@@ -96,7 +105,7 @@ impl Paging {
     pub(crate) fn text(&self) -> String {
         let mib = |b: usize| b as f64 / (1 << 20) as f64;
         format!(
-            "{} of {} bytes read ({:.1} % of the file; {} with what was read again), {} of {} chunks; {} decoded, {} let go; {:.1} of {:.1} MiB held at most",
+            "{} of {} bytes read ({:.1} % of the file; {} with what was read again), {} of {} chunks; {} decoded, {} let go; {:.1}{} MiB held at most",
             thousands(self.bytes_touched as usize),
             thousands(self.file_bytes as usize),
             100.0 * self.bytes_touched as f64 / (self.file_bytes.max(1)) as f64,
@@ -106,7 +115,7 @@ impl Paging {
             thousands(self.chunks_decoded as usize),
             thousands(self.evictions as usize),
             mib(self.most_bytes),
-            mib(self.limit_bytes)
+            self.limit_bytes.map_or(String::new(), |limit| format!(" of {:.1}", mib(limit)))
         )
     }
 }
@@ -132,16 +141,19 @@ mod tests {
         let length = bytes.len() as u64;
         let file = dir.path().join("terrain.pm");
         std::fs::write(&file, &bytes).unwrap();
-        assert_eq!((of_terrain(&file, length), of_terrain(&file, length + 1)), (Some(ROOMY), None));
+        assert_eq!((of_terrain(&file, length), of_terrain(&file, length + 1)), (Some(NO_LIMIT), None));
         // No terrain, no mesh, nothing.
         let other = dir.path().join("other.pm");
         for bytes in [
             encode(&[ProgressiveMesh::default()], &[], &[], &EncodeOptions::default()),
-            Some(bytes[..99].to_vec()),
+            Ok(bytes[..99].to_vec()),
         ] {
             std::fs::write(&other, bytes.unwrap()).unwrap();
             assert_eq!(of_terrain(&other, 1), None);
         }
-        assert_eq!(of_terrain(&dir.path().join("none.pm"), 0), None);
+        // Nor standard input, whatever it is, nor a folder.
+        for none in [dir.path().join("none.pm"), dir.path().into(), "-".into()] {
+            assert_eq!(of_terrain(&none, 0), None);
+        }
     }
 }

@@ -9,8 +9,8 @@ use super::{PagedError, begin, several};
 use crate::format::{ByteRanges, MeshHead};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Pages that may stand beside the shelf, at most: some of those that are foreseen are needed late, or never.
-const MOST: usize = 24;
+/// Pages that may stand beside the shelf, at most: some of those that are foreseen are needed late, or never. Over 16,385 x 16,385 generated samples, whose pages are small, the fast lemniscate takes a sixth less with 96 than with 24.
+const MOST: usize = 96;
 /// Pages that are made at once, at most: what that takes on the way is much more than a page.
 const AT_ONCE: usize = 4;
 /// The part of what is free that they may take.

@@ -1,17 +1,15 @@
 //! When places are due: sorted roughly, so that a frame is told those that are due in it without asking the others.
 //!
-//! A calendar has *days*, each of a frame like the one in which it was begun. What is told to be due stands under the last day that begins before that can be; a frame asks what stands under the days that have begun by then, and leaves there
+//! A calendar has *days*, each of a frame like the one in which it was begun: by how far the eye moves or by how far the view turns, whichever comes first. What is told to be due stands under the last day that begins before that can be; a frame asks what stands under the days that have begun by then, and leaves there
 //! what is not due yet. How lenses really move may differ: then days are long or short, and what is found to be due is the same. After the last day all is to be asked anew.
 
+use crate::aif::NONE;
 use crate::selective::{Clocks, Due, Paces, Sums};
 
-/// Days of a calendar.
+/// Days of a calendar, behind the first: over generated terrain of 4,097 x 4,097 all are asked once in so many frames, which takes as long as what one frame looks at. Other numbers were not tried.
 const DAYS: usize = 32;
-/// Entries of a sheet; a day has as many sheets as it needs.
+/// Entries of a sheet; a day has as many sheets as it needs, the last of them half full on the mean.
 const SHEET: usize = 32;
-
-/// No sheet.
-const NONE: u32 = u32::MAX;
 
 /// The sheets of a day: the last, and how many entries are on it. Those before it are full.
 #[derive(Clone, Copy, Debug)]
@@ -42,12 +40,12 @@ pub(super) struct Calendar {
 impl Default for Calendar {
     fn default() -> Self {
         let days = [Day::EMPTY; DAYS + 1];
-        Calendar { told: Vec::new(), before: Vec::new(), free: NONE, days, paces: None, today: 0 }
+        Calendar { told: vec![], before: vec![], free: NONE, days, paces: None, today: 0 }
     }
 }
 
 impl Calendar {
-    /// Entries that it takes room for so that there can be so many that are true. Others come on top.
+    /// Entries that it takes room for so that so many can be true: a quarter more, for those that are not any more, and sheets that are not full.
     pub(super) fn entries(there: usize) -> usize {
         there + there.div_ceil(4) + SHEET * (DAYS + 2)
     }
@@ -152,8 +150,8 @@ impl Calendar {
         true
     }
 
-    /// Appends the places that are due, of which `is` says when they are; some twice, if they were told so twice. Time goes on.
-    pub(super) fn ask(&mut self, now: Sums, is: impl Fn(u32) -> Due, ready: &mut Vec<u32>) {
+    /// Finds the places that are due, of which `is` says when they are; some twice, if they were told so twice. Time goes on.
+    pub(super) fn ask(&mut self, now: Sums, is: impl Fn(u32) -> Due, mut found: impl FnMut(u32)) {
         let Some((_, starts)) = &self.paces else { return };
         let today = starts.iter().position(|s| s.include(now)).unwrap_or(DAYS);
         let (from, mut whole) = (self.today, true);
@@ -167,7 +165,7 @@ impl Calendar {
                     if !now.have_reached(due) {
                         whole &= self.put(self.today, (at, due));
                     } else if is(at) == due {
-                        ready.push(at);
+                        found(at);
                     }
                 }
                 let before = std::mem::replace(&mut self.before[sheet as usize], self.free);

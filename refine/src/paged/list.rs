@@ -78,7 +78,7 @@ impl List {
         grow(&mut self.ready, there);
     }
 
-    /// Gives room for more than so many back, unless it is in use.
+    /// Gives room for more than so many back, unless it is in use; the calendar's is given back nevertheless: then all are asked.
     pub(super) fn shrink_to(&mut self, [places, there]: [usize; 2]) {
         self.of.shrink_to(places);
         self.due.shrink_to(places);
@@ -206,11 +206,11 @@ impl List {
     }
 
     fn ask_calendar(&mut self, now: Sums) {
-        let (due, ready) = (&self.due, &mut self.ready);
-        self.calendar.ask(now, |at| due.get(at as usize).copied().unwrap_or(Due::NEVER), ready);
         // Each once, though it was put there, or told, more than once since.
-        ready.iter().for_each(|&at| self.sorting[at as usize / 64] |= 1 << (at % 64));
-        ready.clear();
+        let (due, sorting) = (&self.due, &mut self.sorting);
+        let is = |at: u32| due.get(at as usize).copied().unwrap_or(Due::NEVER);
+        self.calendar.ask(now, is, |at| sorting[at as usize / 64] |= 1 << (at % 64));
+        let ready = &mut self.ready;
         for (word, first) in self.sorting.iter_mut().zip((0u32..).step_by(64)).filter(|(w, _)| **w != 0) {
             let mut left = std::mem::take(word);
             while left != 0 {
@@ -244,7 +244,9 @@ impl List {
                 let (mark, due) = sort(e, wanted, due);
                 match mark {
                     Some(Mark::Now) => self.hold(at),
-                    _ => self.set_due(at, due),
+                    // It is told when its page has been wished for.
+                    Some(Mark::Later) => self.due[at as usize] = due,
+                    None => self.set_due(at, due),
                 }
                 if let Some(mark) = mark {
                     self.ready[kept] = at | if mark == Mark::Later { LATER } else { 0 };
@@ -300,6 +302,57 @@ mod tests {
         Entry::new(split, at.as_vec3(), packed)
     }
 
+    fn lens(eye: DVec3, look: DVec3) -> [Lens; 1] {
+        let camera = Camera::new(&CameraParameters {
+            eye,
+            target: eye + look,
+            up: DVec3::Z,
+            projection: Projection::Perspective { fov_y_deg: 50.0 },
+            width: 800,
+            height: 600,
+            near: 1e-3,
+            far: 20.0,
+        });
+        [Lens::about(DVec3::ZERO, &camera.unwrap(), &DMat4::IDENTITY, 1.0, Cull::Frustum).unwrap()]
+    }
+
+    /// Growing takes what was said, and afterwards nothing takes more, though all is due at once and was told more than once, or more often than there is room for.
+    #[test]
+    fn no_more_is_taken_than_was_said() {
+        for (places, times) in [(1, 2), (7, 2), (500, 2), (1000, 2), (3000, 2), (3000, 9)] {
+            let (mut clock, mut list) = (Clocks::new(1.4), List::default());
+            for there in [places / 2, places] {
+                let (before, [more, most]) = (list.bytes(), list.growth([places, there]));
+                list.reserve_to([places, there]);
+                assert!(list.bytes() <= before + more && most <= before, "{places} {there}");
+                assert!(list.capacity()[0] >= places && list.capacity()[1] >= there);
+            }
+            list.extend_to(places);
+            let step = |clock: &mut Clocks, k: f64| {
+                let lens = lens(DVec3::new(1e-3 * k - 0.5, 0.0, 0.1), DVec3::X);
+                clock.go_on(&Judges::new(&lens, 1.0))
+            };
+            step(&mut clock, 0.0);
+            (0..places as u32).for_each(|at| list.put(at, entry(at, DVec3::ZERO)));
+            assert_eq!(list.begin(true, &clock), places);
+            assert!(step(&mut clock, 1.0));
+            (0..places as u32).for_each(|at| list.take_out(at));
+            assert_eq!(list.begin(false, &clock), 0);
+            let bytes = list.bytes();
+            let due = |frames: f32| Due::new(0.0, 1e-3 * (1.0 + frames));
+            for k in 0..times {
+                // Of ninths the last is true.
+                let frames = if times > 2 { (times - k) as f32 } else { 1.0 };
+                (0..places as u32).for_each(|at| list.set_due(at, due(frames - 0.5)));
+            }
+            assert_eq!(list.calendar.includes(clock.sums()), times * places <= 2000);
+            assert!(step(&mut clock, 2.0));
+            assert_eq!(list.begin(false, &clock), places);
+            assert!((0..places).all(|k| list.ready(k).is_some_and(|r| r.0 == k as u32)));
+            assert_eq!(list.bytes(), bytes);
+        }
+    }
+
     /// On a flight that goes faster, stands and turns, while entries come and go, what is found to be due is what is when all are asked.
     #[test]
     fn what_is_due_is_found() {
@@ -330,18 +383,7 @@ mod tests {
             angle += [0.0, 0.0, 2e-3][frame / 7 % 3];
             let look = DVec3::new(angle.cos(), angle.sin(), -0.1);
             eye += speed * look;
-            let camera = Camera::new(&CameraParameters {
-                eye,
-                target: eye + look,
-                up: DVec3::Z,
-                projection: Projection::Perspective { fov_y_deg: 50.0 },
-                width: 800,
-                height: 600,
-                near: 1e-3,
-                far: 20.0,
-            });
-            let lens = Lens::about(DVec3::ZERO, &camera.unwrap(), &DMat4::IDENTITY, 1.0, Cull::Frustum);
-            let lens = [lens.unwrap()];
+            let lens = lens(eye, look);
             let judges = Judges::new(&lens, 1.0);
             let stands = clock.go_on(&judges);
             let soon = list.calendar.includes(clock.sums());
@@ -402,18 +444,7 @@ mod tests {
     /// Few and many, by one thread and by several: what is marked is what is needed, and of the others is noted when they are due, as if each was looked at alone.
     #[test]
     fn what_is_looked_at_is_marked_or_told_when() {
-        let camera = Camera::new(&CameraParameters {
-            eye: DVec3::new(-0.5, 0.0, 0.1),
-            target: DVec3::ZERO,
-            up: DVec3::Z,
-            projection: Projection::Perspective { fov_y_deg: 50.0 },
-            width: 800,
-            height: 600,
-            near: 1e-3,
-            far: 20.0,
-        });
-        let lens = Lens::about(DVec3::ZERO, &camera.unwrap(), &DMat4::IDENTITY, 1.0, Cull::Frustum);
-        let lens = [lens.unwrap()];
+        let lens = lens(DVec3::new(-0.5, 0.0, 0.1), DVec3::new(0.5, 0.0, -0.1));
         let judges = Judges::new(&lens, 1.0);
         for count in [0, 1, 33, 700, 3000, 9001] {
             for threads in [1, 2, 3] {

@@ -4,9 +4,8 @@ use crate::aif::NONE;
 use crate::hierarchy::{Cone, Direction, Hierarchy, Packed, unpack};
 use glam::Vec3;
 
-/// A split and its bounds, ready to be decided about, 32 B: half a line of memory, so that none takes two.
+/// A split and its bounds, ready to be decided about, 32 B.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(32))]
 pub(crate) struct Entry {
     pub(super) centre: Vec3,
     pub(super) radius: f32,

@@ -55,12 +55,13 @@ impl Args {
         let path = self.path.name().to_string();
         let mut report = Report::new(path, self.needs.tau, scene.full_faces(), frames, memory, [read, 0.0]);
         (report.rule, report.paging) = (rule, Some(paging));
-        if self.measure_every.is_some() && course.ground.is_none() {
+        let limited = paging::is_limit(mib);
+        if limited && self.measure_every.is_some() && course.ground.is_none() {
             report.warnings.push(format!(
                 "{file}: to measure, all of the mesh was in memory before the flight, beyond --memory; while it is flown only the samples are"
             ));
         }
-        if self.play.given().is_some() {
+        if limited && self.play.given().is_some() {
             report.warnings.push(format!(
                 "{file}: what the page plays was held beyond --memory until it was written: --html-max limits it"
             ));

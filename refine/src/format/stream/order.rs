@@ -9,7 +9,7 @@ use super::{Next, Path, PathSplits, Vertex};
 use crate::aif::{NONE, Positions};
 use crate::progressive::ProgressiveMesh;
 
-/// Of a part of at least so many splits the tops have chunks of their own: those of smaller parts would repeat more than they hold.
+/// Of a part of at least so many splits the tops have chunks of their own: those of smaller parts would repeat more than they hold. With 1,024 a file of 16,385 x 16,385 samples, whose blocks have some 2,000 splits each, is 12 % larger, and flights take as long.
 const LARGE: usize = 4096;
 /// One in so many splits is a top, but for what they depend on. Over generated terrain of 4,097 x 4,097 the fast lemniscate takes 687,000 splits of chunks with 20, 661,000 with 10 or 5 and 1,239,000 without tops; files are 9, 13, 19 and 0 % larger. With tops of two
 /// kinds, one in 30 and one in 6, it takes 561,000, of files 22 % larger, and with a half or a quarter of the other splits to a chunk 605,000 and 550,000: in no less time.

@@ -53,7 +53,7 @@ impl Due {
 
     /// At a time: of what turning counts so much for. What is no time is now.
     #[inline(always)]
-    pub(in crate::selective) fn new(away: f32, until: f32) -> Due {
+    pub(crate) fn new(away: f32, until: f32) -> Due {
         if until < f32::INFINITY && away < f32::INFINITY { Due { away, until } } else { Due::NOW }
     }
 }
@@ -274,7 +274,7 @@ impl Paces {
     pub(crate) fn frames_to(&self, due: Due, most: usize) -> usize {
         let Sums { moved, turned } = self.from;
         let left = due.until - (moved + due.away * turned);
-        // What is no number, without a step, is due.
+        // Without a step none is; what is no number is due.
         let frames = left / (self.step[0] + due.away * self.step[1]) + 1.0;
         if left > 0.0 { frames.min(most as f32) as usize } else { 0 }
     }
