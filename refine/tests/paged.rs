@@ -291,12 +291,12 @@ fn room_made_ahead_is_used_and_given_back() {
     let more = view.vertex_count();
     assert!(2 * more > 3 * shown && more < 2 * shown, "{more} after {shown}");
     assert_eq!(view.shown_bytes(), room);
-    // Asked for, it is given back, but for an eighth; the next frames are the same.
+    // Asked for, it is given back, but for an eighth, and for some sheets of calendars; the next frames are the same.
     let mut other = first();
     let (before, each) = (other.bytes(), room / (2 * shown));
     let freed = other.trim();
     assert_eq!(other.bytes(), before - freed);
-    assert!(other.shown_bytes() < room * 9 / 16 + 4096 && other.shown_bytes() > each * shown);
+    assert!(other.shown_bytes() < room * 9 / 16 + (1 << 14) && other.shown_bytes() > each * shown);
     assert!(adapt(&mut other, 0.2, 2.5).done.complete);
     assert_same(&other.to_input(), &view.to_input());
     // Where nothing is free pages take its place, if they must.
