@@ -98,7 +98,7 @@ impl Nibble {
     #[inline(always)]
     pub(super) fn find(&self, slot: u32) -> usize {
         let slot = slot as i16;
-        // The first is 0, so one has begun. Compared at once, and counted: half the time of halving, where each step waits for the one before.
+        // The first is 0, so one has begun. Compared at once, and counted: when halving, each step waits for the one before, and bounds take a tenth more time.
         let mut begun = [0; 16];
         for (begun, start) in begun.iter_mut().zip(&self.start) {
             *begun = u8::from(*start <= slot);

@@ -6,7 +6,7 @@
 use crate::aif::NONE;
 use crate::selective::{Clocks, Due, Paces, Sums};
 
-/// Days of a calendar, behind the first: over generated terrain of 4,097 x 4,097 all are asked once in so many frames, which takes as long as what one frame looks at. Other numbers were not tried.
+/// Days of a calendar, behind the first: once in so many frames all are asked. Other numbers were not tried.
 const DAYS: usize = 32;
 /// Entries of a sheet; a day has as many sheets as it needs, the last of them half full on the mean.
 const SHEET: usize = 32;

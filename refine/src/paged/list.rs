@@ -293,7 +293,7 @@ mod tests {
     use super::*;
     use crate::hierarchy::{Packed, pack_up};
     use crate::selective::{Cull, Judges, Lens};
-    use crate::view::{Camera, CameraParameters, Projection};
+    use crate::view::Camera;
     use glam::{DMat4, DVec3};
     use std::collections::{BTreeMap, BTreeSet};
 
@@ -303,17 +303,7 @@ mod tests {
     }
 
     fn lens(eye: DVec3, look: DVec3) -> [Lens; 1] {
-        let camera = Camera::new(&CameraParameters {
-            eye,
-            target: eye + look,
-            up: DVec3::Z,
-            projection: Projection::Perspective { fov_y_deg: 50.0 },
-            width: 800,
-            height: 600,
-            near: 1e-3,
-            far: 20.0,
-        });
-        [Lens::about(DVec3::ZERO, &camera.unwrap(), &DMat4::IDENTITY, 1.0, Cull::Frustum).unwrap()]
+        [Lens::about(DVec3::ZERO, &Camera::looking(eye, look), &DMat4::IDENTITY, 1.0, Cull::Frustum).unwrap()]
     }
 
     /// Growing takes what was said, and afterwards nothing takes more, though all is due at once and was told more than once, or more often than there is room for.

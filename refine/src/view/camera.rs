@@ -121,6 +121,24 @@ fn direction(v: DVec3) -> Option<DVec3> {
     (largest > 0.0 && largest.is_finite()).then(|| (v / largest).normalize())
 }
 
+#[cfg(test)]
+impl Camera {
+    /// For tests of what cameras on a flight decide.
+    pub(crate) fn looking(eye: DVec3, look: DVec3) -> Camera {
+        let of = CameraParameters {
+            eye,
+            target: eye + look,
+            up: DVec3::Z,
+            projection: Projection::Perspective { fov_y_deg: 50.0 },
+            width: 800,
+            height: 600,
+            near: 1e-3,
+            far: 20.0,
+        };
+        Camera::new(&of).unwrap()
+    }
+}
+
 impl Camera {
     /// The camera of these parameters. Errors name the field.
     pub fn new(p: &CameraParameters) -> Result<Camera, CameraError> {

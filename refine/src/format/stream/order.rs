@@ -1,6 +1,6 @@
 //! The order of the splits of a part, and how they are divided into chunks: runs of subtrees, near each other in space; in a large part those of the largest errors first, apart.
 //!
-//! A view needs a chunk as soon as it needs one of its splits, and errors have long tails: the largest of a block of rough terrain are twenty times as large as half of them. So where the tops stand among the others, half of the chunks that a flight needs are needed for
+//! A view needs a chunk as soon as it needs one of its splits, and errors have long tails: the largest of a finest block of rough terrain are more than ten times as large as half of them. So where the tops stand among the others, half of the chunks that a flight needs are needed for
 //! less than one in a hundred of their splits.
 
 use super::super::plan::Curve;

@@ -308,7 +308,7 @@ mod tests {
     use super::*;
     use crate::hierarchy::{Cone, Packed, pack_up};
     use crate::selective::{Cull, Lens};
-    use crate::view::{Camera, CameraParameters, NormalCone, Projection};
+    use crate::view::{Camera, NormalCone};
     use glam::{DMat4, DVec3};
 
     /// On flights of all speeds, near the ground and through it, what is not due is what it was decided to be; and near things are looked at far less often than by one clock.
@@ -344,19 +344,10 @@ mod tests {
                 let look = DVec3::new(angle.cos(), angle.sin(), -0.1);
                 eye += speed * look;
                 angle += turn;
-                let camera = Camera::new(&CameraParameters {
-                    eye,
-                    target: eye + look,
-                    up: DVec3::Z,
-                    projection: Projection::Perspective { fov_y_deg: 50.0 },
-                    width: 800,
-                    height: 600,
-                    near: 1e-3,
-                    far: 20.0,
-                });
+                let camera = Camera::looking(eye, look);
                 let tau = if frame == 20 { 1.1 } else { 1.0 };
                 let cull = [Cull::Frustum, Cull::All, Cull::None][round % 3];
-                let lens = [Lens::about(DVec3::ZERO, &camera.unwrap(), &DMat4::IDENTITY, tau, cull).unwrap()];
+                let lens = [Lens::about(DVec3::ZERO, &camera, &DMat4::IDENTITY, tau, cull).unwrap()];
                 let judges = Judges::new(&lens, [1.0, 0.8][round / 12]);
                 let (stands, one_stands) = (clocks.go_on(&judges), one.go_on(&judges));
                 assert_eq!(stands, one_stands);
