@@ -15,6 +15,7 @@ mod bounds;
 mod codec;
 mod coder;
 mod container;
+pub(crate) mod direct;
 mod extras;
 mod input_order;
 mod lattice;

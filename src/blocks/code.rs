@@ -100,7 +100,7 @@ impl Blocks<'_> {
         let splits = self.figures().splits as u32;
         let about = (0.5 * low + 0.5 * high, (high - low).length());
         let tree = Tree::new(base, &like, splits, about, Guarantee::Vertical).ok_or_else(contradiction)?;
-        Ok((tree, (low, high)))
+        Ok((tree.with_steps(self.frame.steps()), (low, high)))
     }
 }
 

@@ -43,6 +43,11 @@ impl Frame {
         Frame { scale, greatest: greatest * scale[1] }
     }
 
+    /// What coordinates are multiples of, if heights are whole.
+    pub(super) fn steps(&self) -> [f64; 3] {
+        [1.0, self.scale[1], self.scale[0]]
+    }
+
     /// For so many vertices. Columns and rows are exact either way.
     fn room(&self, vertices: usize) -> Positions {
         if self.scale[0] == 1.0 {

@@ -141,7 +141,7 @@ impl PagedScene {
         };
         let shell_bytes = of_scene.map_or(0, |c| c.stored);
         let Shelled { scene: shell, boxes, .. } = pm::shell(bytes.as_deref(), meshes)?;
-        let chunks = directory.chunks.iter().filter(|c| c.kind == ChunkType::SPLITS).count();
+        let chunks = directory.chunks.iter().filter(|c| c.kind.is_read_alone()).count();
         let views = bases(&reader, limit)?;
         let places = places_of(&shell, meshes);
         Ok(PagedScene {

@@ -3,6 +3,7 @@
 use super::base::MeshHead;
 use super::codec::{self, Sequel};
 use super::container::{Chunk, ChunkType, Directory, EXPANSION, FormatError};
+use super::direct;
 use super::input_order;
 use super::places;
 use super::read::Piece;
@@ -113,7 +114,7 @@ impl Assembly {
         let mut counts = vec![(0, 0); self.meshes.len()];
         // A damaged directory may tell of chunks that overlap.
         let mut most = bytes.saturating_mul(EXPANSION);
-        for chunk in chunks.iter().filter(|c| matches!(c.kind, ChunkType::SPLITS | ChunkType::SEQUEL)) {
+        for chunk in chunks.iter().filter(|c| c.kind.is_splits()) {
             let (Some(count), Some(Some(part))) =
                 (counts.get_mut(chunk.mesh as usize), self.meshes.get(chunk.mesh as usize))
             else {
@@ -324,6 +325,14 @@ impl StreamSizes {
             ChunkType::ORDER => self.order += chunk.stored,
             ChunkType::SCENE => self.scene += chunk.stored,
             ChunkType::BOUNDS => self.bounds += chunk.stored,
+            ChunkType::DIRECT => {
+                let [c, e, p] = direct::sizes(bytes).unwrap_or_default();
+                self.connectivity += c;
+                self.errors += e;
+                self.places += p;
+                self.other += chunk.stored.saturating_sub(c + e + p);
+                self.chunks += 1;
+            }
             ChunkType::SPLITS | ChunkType::SEQUEL => {
                 let [c, e, p, a, f] = splits::sizes(bytes).unwrap_or_default();
                 self.connectivity += c;

@@ -6,7 +6,7 @@ use std::fmt;
 pub const MAGIC: [u8; 8] = *b"\x89PMF\r\n\x1A\n";
 
 /// The version this module writes. A reader takes any minor version of its major one.
-pub const VERSION: (u16, u16) = (5, 0);
+pub const VERSION: (u16, u16) = (5, 1);
 
 pub(super) const HEAD: usize = 48;
 pub(super) const ENTRY: usize = 64;
@@ -29,6 +29,8 @@ impl ChunkType {
     pub const SPLITS: ChunkType = ChunkType(*b"SPLT");
     /// Vertex splits, read when those before are there.
     pub const SEQUEL: ChunkType = ChunkType(*b"SPLS");
+    /// Vertex splits by direct references, read alone: the fastest to read.
+    pub const DIRECT: ChunkType = ChunkType(*b"SPLD");
     /// The input's numbering of a mesh.
     pub const ORDER: ChunkType = ChunkType(*b"ORDR");
     /// Links and bounds of the chunk before it, for refining out of core ([`crate::paged`]).
@@ -41,6 +43,18 @@ impl ChunkType {
     pub const EXTRAS: ChunkType = ChunkType(*b"XTRA");
     /// What a mesh is of a height grid.
     pub const TERRAIN: ChunkType = ChunkType(*b"TERR");
+}
+
+impl ChunkType {
+    /// It holds vertex splits.
+    pub fn is_splits(self) -> bool {
+        self.is_read_alone() || self == ChunkType::SEQUEL
+    }
+
+    /// It holds vertex splits that are read without those before.
+    pub fn is_read_alone(self) -> bool {
+        self == ChunkType::SPLITS || self == ChunkType::DIRECT
+    }
 }
 
 impl fmt::Display for ChunkType {
@@ -339,9 +353,10 @@ impl Directory {
             if c.raw > c.stored.saturating_mul(EXPANSION) || c.count as u64 > c.raw {
                 return Err(c.damage("it is too short for what it is to hold"));
             }
-            const KNOWN: [ChunkType; 6] = [
+            const KNOWN: [ChunkType; 7] = [
                 ChunkType::BASE,
                 ChunkType::SPLITS,
+                ChunkType::DIRECT,
                 ChunkType::SEQUEL,
                 ChunkType::BOUNDS,
                 ChunkType::ORDER,
@@ -365,10 +380,10 @@ impl Directory {
                 (ChunkType::BASE, None) => *mesh = Some(0),
                 (ChunkType::BASE, Some(_)) => misplaced("the mesh has a base already"),
                 (_, None) => misplaced("it comes before the base of its mesh"),
-                (ChunkType::SPLITS | ChunkType::SEQUEL, Some(n)) if c.first != n => {
+                (kind, Some(n)) if kind.is_splits() && c.first != n => {
                     misplaced("its splits do not follow those before");
                 }
-                (ChunkType::SPLITS | ChunkType::SEQUEL, Some(n)) => match n.checked_add(c.count) {
+                (kind, Some(n)) if kind.is_splits() => match n.checked_add(c.count) {
                     Some(n) => *mesh = Some(n),
                     None => misplaced("more splits than ids can name"),
                 },

@@ -4,6 +4,7 @@ use super::assembly::{Assembly, Decoded, StreamSizes};
 use super::base::{self, MeshHead};
 use super::bounds;
 use super::codec::{self, Room, Sequel};
+use super::direct;
 use super::container::{Chunk, ChunkType, Directory, FormatError, HEAD};
 use super::splits::SplitBlock;
 use crate::hierarchy::Bounds;
@@ -62,6 +63,12 @@ pub(crate) fn read_piece_within(
             let block =
                 codec::read(head, &mut state, Some(room), at, (chunk.count as usize, chunk.raw), bytes);
             head.start.give(state);
+            Ok(Piece::Splits(Box::new(block.ok_or_else(damaged)?)))
+        }
+        ChunkType::DIRECT => {
+            let head = head.ok_or_else(|| chunk.damage("the base of its mesh is not known"))?;
+            let at = (chunk.first, chunk.first_face);
+            let block = direct::read(head, at, (chunk.count, chunk.raw), bytes);
             Ok(Piece::Splits(Box::new(block.ok_or_else(damaged)?)))
         }
         ChunkType::SEQUEL => Ok(Piece::Sequel(bytes.to_vec())),

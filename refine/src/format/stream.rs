@@ -15,7 +15,6 @@ use super::codec::Start;
 use super::container::{Chunk, ChunkType, Directory};
 use super::lattice;
 use super::pages;
-use super::plan::{self, Label};
 use super::write::{Part, part};
 use crate::aif::{NONE, Positions};
 use crate::hierarchy::{Cone, Guarantee, Packed};
@@ -30,6 +29,8 @@ pub struct Tree {
     base: ProgressiveMesh,
     about: (DVec3, f64),
     guarantee: Guarantee,
+    /// Of coordinates, by axis.
+    steps: [f64; 3],
     chunk: usize,
 }
 
@@ -63,13 +64,20 @@ impl Tree {
             start: Start::new(&base)?,
             ..MeshHead::default()
         };
-        Some(Tree { head, base, about, guarantee, chunk: CHUNK })
+        Some(Tree { head, base, about, guarantee, steps: [1.0; 3], chunk: CHUNK })
     }
 
     /// Chunks of at most so many splits, but for those of a single vertex.
     #[must_use]
     pub fn with_chunk(mut self, splits: usize) -> Tree {
         self.chunk = splits.max(1);
+        self
+    }
+
+    /// Coordinates are mostly whole multiples of these, or such of what fits into an f32: then they take few bytes. Each is kept whatever it is.
+    #[must_use]
+    pub fn with_steps(mut self, steps: [f64; 3]) -> Tree {
+        self.steps = steps;
         self
     }
 
@@ -89,7 +97,7 @@ impl Tree {
         let head = MeshHead { single, ..self.head.clone() };
         let (mut next, mut band, mut subtree) = (0u32, 0, 0);
         for c in &mut chunks {
-            if c.kind == ChunkType::SPLITS {
+            if c.kind == ChunkType::DIRECT {
                 if c.first != next {
                     return None;
                 }
@@ -144,9 +152,6 @@ impl Next {
 /// A vertex of the path.
 #[derive(Clone, Copy, Debug)]
 struct Vertex {
-    label: Label,
-    /// The next in the order of descent.
-    behind: u32,
     /// The last split of it, or that which made it.
     last: u32,
     /// The node it is at, by numbers in the file.
@@ -162,17 +167,9 @@ pub struct Path<'a> {
     /// As though the mesh ended here.
     head: MeshHead,
     mesh: ProgressiveMesh,
-    /// What each split depends on.
-    on: Vec<[u32; 3]>,
-    /// Where the vertex stands that each makes.
-    places: Vec<[f64; 3]>,
     /// Which corner of each face that splits make was the tip; they are turned so that it is the first.
     tips: Vec<u8>,
     vertices: Vec<Vertex>,
-    /// The first in the order of descent.
-    first: u32,
-    /// The first split of every chunk.
-    chunks: Vec<u32>,
     /// For every part its first split, here and in the file.
     names: Vec<[u32; 2]>,
     parts: Vec<Open>,
@@ -181,21 +178,15 @@ pub struct Path<'a> {
 impl<'a> Path<'a> {
     /// At the base.
     pub fn new(tree: &'a Tree) -> Path<'a> {
-        let order = plan::base_order(&tree.base);
-        let vertex = |(label, node)| Vertex { label, behind: NONE, last: NONE, node, next: Next::NOTHING };
-        let mut vertices: Vec<Vertex> = plan::labels(&order).into_iter().zip(0..).map(vertex).collect();
-        order.windows(2).for_each(|w| vertices[w[0] as usize].behind = w[1]);
+        let vertex = |node| Vertex { last: NONE, node, next: Next::NOTHING };
+        let vertices = (0..tree.head.base_vertices).map(vertex).collect();
         let head = MeshHead { splits: 0, ..tree.head.clone() };
         Path {
             tree,
             head,
             mesh: tree.base.clone(),
-            on: vec![],
-            places: vec![],
             tips: vec![],
             vertices,
-            first: order.first().copied().unwrap_or(NONE),
-            chunks: vec![],
             names: vec![],
             parts: vec![],
         }
@@ -204,6 +195,11 @@ impl<'a> Path<'a> {
     /// Vertices of the mesh.
     pub fn vertices(&self) -> u32 {
         self.vertices.len() as u32
+    }
+
+    /// Splits on the way.
+    fn splits(&self) -> u32 {
+        self.mesh.splits.len() as u32
     }
 
     /// Faces of the mesh.

@@ -6,7 +6,7 @@ use super::page::{Base, Page, Record, RowRef};
 use super::pool::{APPLIED, Hot, LED, NEEDS, Pool};
 use crate::aif::NONE;
 use crate::format::{
-    ByteRanges, CONTRADICTS, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, Room, pages,
+    ByteRanges, CONTRADICTS, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, Room, direct, pages,
     read_piece, read_piece_within,
 };
 use crate::hierarchy::{Guarantee, Packed};
@@ -164,7 +164,11 @@ fn on_the_way(head: &MeshHead, [c, page]: [&Chunk; 2], room: Room, settled: bool
     let more = 2 + 4 * u64::from(settled);
     let parts = (18 + 24 + pages::SPLIT + size_of::<Packed>() as u64 + more) * c.count as u64;
     let beside = pages::scratch(c.count, page.raw, settled).max(parts);
-    let all = fetched.saturating_add(room.bytes(head, c)).saturating_add(beside);
+    let way = match c.kind {
+        ChunkType::DIRECT => direct::scratch(c.count),
+        _ => room.bytes(head, c),
+    };
+    let all = fetched.saturating_add(way).saturating_add(beside);
     usize::try_from(all).unwrap_or(usize::MAX / 4)
 }
 
@@ -231,7 +235,7 @@ impl<S: ByteRanges> Shelf<S> {
         let mut all = Vec::new();
         for c in directory.chunks.iter().filter(|c| c.mesh == m) {
             match c.kind {
-                ChunkType::SPLITS => {
+                kind if kind.is_read_alone() => {
                     let bounds = behind(c, 1, ChunkType::BOUNDS)?;
                     if (bounds.first, bounds.count) != (c.first, c.count) {
                         return Err(bounds.damage("it is not that of the chunk before").into());

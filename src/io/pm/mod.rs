@@ -99,11 +99,8 @@ pub fn decode_what_is_there(bytes: &[u8]) -> Result<DecodedProgressive, DecodeEr
 /// What is left of a damaged file.
 fn what_is_used(damage: &FormatError, decoded: &format::Decoded, bases: usize) -> String {
     let splits: usize = decoded.meshes.iter().map(|m| m.splits.len()).sum();
-    let of = |kinds: &[ChunkType]| {
-        let lost = decoded.report.lost.iter().filter(|c| kinds.contains(&c.kind));
-        lost.map(|c| c.count as usize).sum::<usize>()
-    };
-    let all = splits + of(&[ChunkType::SPLITS, ChunkType::SEQUEL]);
+    let lost = decoded.report.lost.iter().filter(|c| c.kind.is_splits());
+    let all = splits + lost.map(|c| c.count as usize).sum::<usize>();
     let mut said =
         format!("{damage}; what is whole is used: {} of {}", thousands(splits), count(all, "split"));
     if bases > 0 {

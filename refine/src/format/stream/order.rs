@@ -3,6 +3,7 @@
 //! A view needs a chunk as soon as it needs one of its splits, and errors have long tails: the largest of a finest block of rough terrain are more than ten times as large as half of them. So where the tops stand among the others, half of the chunks that a flight needs are needed for
 //! less than one in a hundred of their splits.
 
+use super::super::direct;
 use super::super::plan::Curve;
 use super::part::Open;
 use super::{Next, Path, PathSplits, Vertex};
@@ -34,7 +35,7 @@ pub(super) struct Order {
 impl Path<'_> {
     /// What each split of a part depends on. `None` if they refer to what does not exist.
     pub(super) fn needs(&self, part: &PathSplits, owner: &[u32]) -> Option<Vec<[u32; 3]>> {
-        let (first, faces) = (self.on.len() as u32, self.faces());
+        let (first, faces) = (self.splits(), self.faces());
         let mut last: Vec<u32> = self.vertices.iter().map(|v| v.last).collect();
         let s = &part.splits;
         let mut all = Vec::with_capacity(s.len());
@@ -73,7 +74,7 @@ impl Path<'_> {
             on,
             ..Order::default()
         };
-        let (first, known) = (self.on.len() as u32, self.vertices.len() as u32);
+        let (first, known) = (self.splits(), self.vertices.len() as u32);
         for (t, on) in (0u32..).zip(&order.on) {
             if let Some(b) = on[0].checked_sub(first).filter(|_| on[0] != NONE) {
                 let same = part.splits.vertex[b as usize] == part.splits.vertex[t as usize];
@@ -143,7 +144,7 @@ impl Path<'_> {
         Some(())
     }
 
-    /// Appends those candidates that can come now, as a chunk, in sweeps over its vertices; returns the others.
+    /// Appends those candidates that can come now, as a chunk, turn by turn; returns the others.
     fn add(
         &mut self,
         part: &PathSplits,
@@ -154,86 +155,57 @@ impl Path<'_> {
     ) -> Vec<u32> {
         candidates.sort_unstable();
         let number = order.counts.len() as u32;
-        let first = self.on.len() as u32;
+        let first = self.splits();
         let known = open.vertices as u32;
         let own = |d: u32| d.checked_sub(first).filter(|_| d != NONE);
         let vertex = |order: &Order, t: u32| {
             let v = part.splits.vertex[t as usize];
             v.checked_sub(known).map_or(v, |k| known + order.slot[k as usize])
         };
-        let mut roots: Vec<(u64, u32, u32)> = Vec::new();
+        let (mut chosen, mut roots) = (vec![], vec![]);
         candidates.retain(|&t| {
             let on = order.on[t as usize];
             let can = on.iter().all(|&d| own(d).is_none_or(|k| order.chunk[k as usize] != NONE));
             if can {
                 order.chunk[t as usize] = number;
+                // Until it has one.
+                order.slot[t as usize] = chosen.len() as u32;
                 if own(on[0]).is_none_or(|k| order.chunk[k as usize] != number) {
-                    let v = vertex(order, t);
-                    roots.push((self.vertices[v as usize].label.key(), v, t));
+                    roots.push((vertex(order, t), chosen.len() as u32));
                 }
+                chosen.push(t);
             }
             !can
         });
         roots.sort_unstable();
-        if roots.windows(2).any(|w| w[0].0 == w[1].0) {
-            // Split too often for their labels to tell: vertices in turn.
-            let rank = self.ranks();
-            roots.sort_unstable_by_key(|r| rank[r.1 as usize]);
-        }
-        let mut list: Vec<u32> = roots.into_iter().map(|r| r.2).collect();
-        let mut pass = Vec::with_capacity(list.len());
-        while !list.is_empty() {
-            std::mem::swap(&mut list, &mut pass);
-            list.clear();
-            pass.reverse();
-            // Both vertices of a split come again in the next sweep.
-            while let Some(t) = pass.pop() {
-                let ready = |&d: &u32| {
-                    let k = own(d).map(|k| k as usize);
-                    k.is_none_or(|k| order.chunk[k] != number || order.slot[k] != NONE)
-                };
-                if !order.on[t as usize].iter().all(ready) {
-                    list.push(t);
-                    continue;
-                }
-                let slot = order.order.len() as u32;
-                let v = vertex(order, t);
-                order.slot[t as usize] = slot;
-                order.order.push(t);
-                self.grow(v, (first + slot, file + slot), known, open);
-                let here = |s: &u32| *s != NONE && order.chunk[*s as usize] == number;
-                let [again, new] = order.next[t as usize];
-                list.extend(Some(again).filter(here));
-                list.extend(Some(new).filter(here));
-            }
+        let roots: Vec<u32> = roots.into_iter().map(|r| r.1).collect();
+        let here = |k: u32| match order.chunk.get(k as usize) {
+            Some(&chunk) if chunk == number => order.slot[k as usize],
+            _ => NONE,
+        };
+        let on: Vec<_> = chosen.iter().map(|&t| order.on[t as usize].map(|d| own(d).map_or(NONE, here))).collect();
+        let next: Vec<_> = chosen.iter().map(|&t| order.next[t as usize].map(here)).collect();
+        for k in direct::arrange(&on, &next, &roots) {
+            let t = chosen[k as usize];
+            let slot = order.order.len() as u32;
+            let v = vertex(order, t);
+            order.slot[t as usize] = slot;
+            order.order.push(t);
+            self.grow(v, (first + slot, file + slot), known, open);
         }
         candidates
     }
 
-    /// The place of each vertex in the order of descent.
-    pub(super) fn ranks(&self) -> Vec<u32> {
-        let mut ranks = vec![0; self.vertices.len()];
-        let (mut v, mut k) = (self.first, 0);
-        while let Some(vertex) = self.vertices.get(v as usize) {
-            ranks[v as usize] = k;
-            (v, k) = (vertex.behind, k + 1);
-        }
-        ranks
-    }
-
     /// Splits vertex `v`: notes what it was, and appends the new one. The split is numbered on the path and in the file.
     fn grow(&mut self, v: u32, (split, file): (u32, u32), known: u32, open: &mut Open) {
-        let new = self.vertices.len() as u32;
         let at = &mut self.vertices[v as usize];
         if v < known {
             open.undo.push((v, *at));
         }
         open.parent.push(at.node);
-        let label = at.label.split();
-        let behind = std::mem::replace(&mut at.behind, new);
         let node = self.head.base_vertices + 2 * file;
         (at.last, at.node) = (split, node);
-        self.vertices.push(Vertex { label, behind, last: split, node: node + 1, next: Next::NOTHING });
+        self.vertices.push(Vertex { last: split, node: node + 1, next: Next::NOTHING });
     }
 }
 

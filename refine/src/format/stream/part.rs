@@ -1,11 +1,11 @@
 //! A part on the path: its splits coded, and the links behind them.
 
-use super::super::codec::{self, Sequel, Sources};
 use super::super::container::{Chunk, ChunkType};
+use super::super::direct::{self, Rows};
 use super::super::pages;
 use super::super::places;
-use super::super::splits::{Counts, rounded_error, without_arrangement};
-use super::super::write::{Part, bounds_beside, part, raw_bytes};
+use super::super::splits::{error_level, rounded_error, without_arrangement};
+use super::super::write::{Part, bounds_beside, part};
 use super::{NO_BOUNDS, Next, Path, Vertex};
 use crate::aif::{NONE, Positions};
 use crate::hierarchy::{Bounds, Cone, Packed, pack_up};
@@ -67,7 +67,6 @@ pub(super) struct Open {
     pub(super) vertices: usize,
     faces: usize,
     singles: usize,
-    chunks: usize,
     /// Vertices of before, as they were before each split of one.
     pub(super) undo: Vec<(u32, Vertex)>,
     /// In the order of the file: the nodes replaced, and bounds.
@@ -101,11 +100,10 @@ impl Path<'_> {
         }
         let mut open = Open {
             file,
-            splits: self.on.len(),
+            splits: self.splits() as usize,
             vertices: self.vertices.len(),
             faces: self.tips.len(),
             singles: self.head.single.len(),
-            chunks: self.chunks.len(),
             ..Open::default()
         };
         let (n0, m0) = (self.head.base_vertices, self.head.base_faces);
@@ -134,7 +132,7 @@ impl Path<'_> {
             if c == NONE { c } else { (numbers.face(f) << 2) | (((c & 3) + 3 - u32::from(tip(f))) % 3) }
         };
         let mut added = Vec::with_capacity(owner.len());
-        for (&t, k) in order.order.iter().zip(self.on.len() as u32..) {
+        for (&t, k) in order.order.iter().zip(open.splits as u32..) {
             let t = t as usize;
             let to = &mut self.mesh.splits;
             to.vertex.push(numbers.vertex(s.vertex[t]));
@@ -144,12 +142,6 @@ impl Path<'_> {
             to.error.push(s.error[t]);
             let place = places::point(&given.positions, t);
             places::push(self.mesh.new_positions.plain(), place);
-            self.places.push(place);
-            let now = |d: u32| match d.checked_sub(open.splits as u32) {
-                Some(b) if d != NONE => open.splits as u32 + order.slot[b as usize],
-                _ => d,
-            };
-            self.on.push(order.on[t].map(now));
             added.push(s.code[t].left().0 as u8);
             if s.code[t].two_faces() {
                 added.push(s.code[t].right().0 as u8);
@@ -164,44 +156,44 @@ impl Path<'_> {
             });
         }
         self.tips.extend(added);
-        self.head.splits = self.on.len() as u32;
+        self.head.splits = self.splits();
         self.names.push([open.splits as u32, file]);
-        debug_assert_eq!(self.vertices.len(), n0 as usize + self.on.len());
+        debug_assert_eq!(self.vertices.len(), (n0 + self.splits()) as usize);
         self.code(&mut open, &order.counts)?;
         self.parts.push(open);
         Some(numbers)
     }
 
+    /// The splits of a chunk as they are in the file.
+    fn rows(&self, range: std::ops::Range<usize>) -> Rows {
+        let s = &self.mesh.splits;
+        let cut = |c: u32| match self.head.maker(c >> 2) {
+            Some((i, second)) if c != NONE => {
+                (self.head.base_faces + 2 * self.name(i) + u32::from(second)) << 2 | c & 3
+            }
+            _ => c,
+        };
+        Rows {
+            first: self.name(range.start as u32),
+            vertex: s.vertex[range.clone()].iter().map(|&v| self.vertex_name(v)).collect(),
+            cuts: range.clone().map(|k| [cut(s.left[k]), cut(s.right[k])]).collect(),
+            code: s.code[range.clone()].to_vec(),
+            level: s.error[range.clone()].iter().map(|&e| error_level(e) as u16).collect(),
+            place: range.map(|k| self.mesh.new_positions.get(k).to_array()).collect(),
+        }
+    }
+
     /// Codes the chunks of the part that was just added.
     fn code(&mut self, open: &mut Open, counts: &[usize]) -> Option<()> {
-        let mut at = open.splits;
-        for count in counts {
-            self.chunks.push(at as u32);
-            at += count;
-        }
-        let firsts: Vec<u32> = self.chunks.iter().copied().chain([at as u32]).collect();
-        let mut sources = Sources::new(&self.head, &self.on, &firsts, &self.places).with_names(&self.names);
-        let base = self.head.base_wedges as usize;
-        let counts_at = |split: usize| Counts {
-            split,
-            face: self.head.first_face(split as u32) as usize,
-            wedge: base,
-            row: base,
-            ..Counts::default()
-        };
-        let mut streams = codec::Streams::default();
+        let (mut streams, mut room) = Default::default();
+        let point = if self.head.double { 24 } else { 12 };
         let mut at = open.splits;
         for &count in counts {
-            let (first, end) = (counts_at(at), counts_at(at + count));
-            let mut state = Sequel::new(&self.head, self.head.start.take()?);
-            sources.find(at..at + count);
-            let piece = (first, count);
-            let bytes =
-                codec::write(&self.head, &self.mesh, &mut state, piece, Some(&mut sources), &mut streams)?;
-            self.head.start.give(state);
-            let mut splits = part(ChunkType::SPLITS, true, 0, raw_bytes(&self.head, first, end), bytes);
+            let rows = self.rows(at..at + count);
+            let bytes = direct::write(&self.head, &rows, self.tree.steps, (&mut streams, &mut room))?;
+            let mut splits = part(ChunkType::DIRECT, true, 0, (18 + point) * count as u64, bytes);
             let chunk = &mut splits.chunk;
-            (chunk.first, chunk.count) = (open.file + (at - open.splits) as u32, count as u32);
+            (chunk.first, chunk.count) = (rows.first, count as u32);
             chunk.band = self.parts.len() as u32;
             let errors = &self.mesh.splits.error[at..at + count];
             chunk.error = errors.iter().map(|&e| rounded_error(e)).fold(0.0, f32::max);
@@ -225,7 +217,6 @@ impl Path<'_> {
     /// `None` if there is no part.
     pub fn pop(&mut self) -> Option<Written> {
         let open = self.parts.pop()?;
-        self.names.pop();
         let n0 = self.head.base_vertices;
         let (start, m) = (open.splits, open.parent.len());
         let begin = n0 + 2 * open.file;
@@ -256,7 +247,7 @@ impl Path<'_> {
             let at = (first - open.file) as usize;
             let own = at..at + count as usize;
             let local = &self.mesh.splits.vertex[start + own.start..start + own.end];
-            let vertices: Vec<u32> = local.iter().map(|&v| self.in_file(v, &open)).collect();
+            let vertices: Vec<u32> = local.iter().map(|&v| self.vertex_name(v)).collect();
             let own = pages::Own { bounds: &open.packed[own], turns: None };
             let (bytes, raw) = pages::write(&self.tree.head, first, &vertices, own, &links)?;
             let mut page = part(ChunkType::PAGE, false, 0, raw, bytes);
@@ -268,6 +259,7 @@ impl Path<'_> {
             }
         }
         // The mesh before.
+        self.names.pop();
         let vertex = &self.mesh.splits.vertex;
         let firsts: Vec<(u32, Next)> = (0..m)
             .rev()
@@ -280,10 +272,7 @@ impl Path<'_> {
         // The first split of a vertex comes last here.
         firsts.into_iter().for_each(|(v, next)| self.vertices[v as usize].next = next);
         self.vertices.truncate(open.vertices);
-        self.on.truncate(start);
-        self.places.truncate(start);
         self.tips.truncate(open.faces);
-        self.chunks.truncate(open.chunks);
         self.head.single.truncate(open.singles);
         self.head.splits = start as u32;
         let s = &mut self.mesh.splits;
@@ -299,13 +288,16 @@ impl Path<'_> {
         Some(out)
     }
 
-    /// The number in the file of a vertex; `top` is the part on top, or was just now.
-    fn in_file(&self, v: u32, top: &Open) -> u32 {
+    /// The number in the file of a vertex.
+    fn vertex_name(&self, v: u32) -> u32 {
         let n0 = self.head.base_vertices;
-        let Some(k) = v.checked_sub(n0) else { return v };
-        let name = self.names.iter().copied().chain([[top.splits as u32, top.file]]);
-        let of = name.take_while(|n| n[0] <= k).last().unwrap_or([0, 0]);
-        n0 + of[1] + (k - of[0])
+        v.checked_sub(n0).map_or(v, |i| n0 + self.name(i))
+    }
+
+    /// The number in the file of a split.
+    fn name(&self, i: u32) -> u32 {
+        let run = self.names.partition_point(|n| n[0] <= i).checked_sub(1);
+        run.map_or(i, |k| self.names[k][1] + (i - self.names[k][0]))
     }
 }
 

@@ -1,0 +1,668 @@
+//! Chunks of splits by direct references: read alone, with nothing done that is not the chunk's own.
+//!
+//! A terrain's chunks are there to be read while a view waits for them. Most of the time that `SPLT` takes goes into doing splits, those of the chunk and nearly as many of its context, to count
+//! edges in their rings. Here a split says in which turn it comes, and which splits made the faces that its cuts name: more bytes for connectivity than by ranks, none for contexts, and a fourth of the time.
+//! FORMAT.md, "SPLD", has the rules.
+
+mod axis;
+
+pub(super) use self::axis::Axis;
+use super::base::{MeshHead, Singles};
+use super::coder::{Bit, Coder, Decoder, Encoder, Nibble, Number, low_mask, put_varint, take_varint, unzigzag, zigzag};
+use super::places;
+use super::splits::{CONNECTIVITY, ERROR_SHIFT, ERRORS, MOST_LEVEL, PLACES, SplitBlock};
+use crate::aif::NONE;
+use crate::progressive::SplitCode;
+use rustc_hash::FxHashMap;
+
+/// Kinds of streams: those of other chunks of splits, without attributes and faces.
+pub(super) const STREAMS: usize = 3;
+
+/// After so many splits a reader looks whether there was enough to read.
+const CHECKED: usize = 16;
+
+/// Of how many turns a split waits: so many are told apart, then more, then that none comes.
+const MORE: u32 = 14;
+const NEVER: u32 = 15;
+
+/// What a cut's face was made by: a split of the chunk, one before it, or the last of the vertex in the chunk; there is no cut.
+const INSIDE: u32 = 0;
+const OUTSIDE: u32 = 1;
+const PARENT: u32 = 2;
+const NO_CUT: u32 = 3;
+
+/// Codes that have a symbol of their own.
+const CODES: usize = 15;
+
+/// Levels below that of the split before at the vertex have symbols up to here, in contexts by so many levels above the least.
+const FAR: u16 = 15;
+const TOPS: usize = 12;
+
+/// Contexts of lengths: of the last residual at the vertex, or none.
+const LENGTHS: usize = 16;
+
+/// The splits of a chunk.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Rows {
+    /// The first split.
+    pub(super) first: u32,
+    /// The vertex that each splits, by its number in the file.
+    pub(super) vertex: Vec<u32>,
+    /// Left and right cut; faces are numbered as if every split of the file made two. [`NONE`] for no right cut.
+    pub(super) cuts: Vec<[u32; 2]>,
+    pub(super) code: Vec<SplitCode>,
+    /// The error as the file keeps it.
+    pub(super) level: Vec<u16>,
+    pub(super) place: Vec<[f64; 3]>,
+}
+
+/// What of a vertex the splits of a chunk need.
+#[derive(Clone, Copy, Debug)]
+struct Local {
+    /// Its number in the file.
+    vertex: u32,
+    /// The next of those that are split in the same turn.
+    behind: u32,
+    /// The last split of the chunk that made it or split it.
+    last: u32,
+    /// The level of that.
+    level: u16,
+    /// What to expect of residuals here, by axis.
+    lengths: [u8; 3],
+    /// Where it is, or one beside it, as numbers of the axes.
+    place: [i64; 3],
+}
+
+/// What a writer knows beside the rows.
+struct Plan<'a> {
+    rows: &'a Rows,
+    turn: Vec<u32>,
+    /// The splits of the chunk that replace the two vertices of each.
+    next: Vec<[u32; 2]>,
+    /// Vertices from before that are split in the chunk, ascending, and the first split of each.
+    roots: Vec<(u32, u32)>,
+    /// Faces from before that cuts name, ascending.
+    outside: Vec<u32>,
+    codes: Vec<u16>,
+    /// The longest residuals, by axis.
+    shifts: [u32; 3],
+}
+
+/// A number by its length and its bits, of `shift` + 15 bits at most: lengths up to `shift` share the first symbol.
+#[inline(always)]
+fn sized<C: Coder>(c: &mut C, m: &mut Nibble, shift: u32, x: u64) -> (u64, u32) {
+    let length = 64 - x.leading_zeros();
+    let symbol = c.nibble(m, length.saturating_sub(shift).min(15));
+    let rest = (shift + symbol - u32::from(symbol > 0)).min(63);
+    let low = c.plain64(rest, x & low_mask(rest));
+    (if symbol > 0 { 1 << rest | low } else { low }, symbol)
+}
+
+/// What [`sized`] leaves out of the lengths of numbers up to this one.
+fn shift_for(most: u64) -> u32 {
+    (64 - most.leading_zeros()).saturating_sub(15)
+}
+
+/// Codes one chunk.
+struct Codec {
+    base_vertices: u32,
+    base_faces: u32,
+    first: u32,
+    axes: [Axis; 3],
+    shifts: [u32; 3],
+    codes: Vec<u16>,
+    levels: [u16; 2],
+    of: Vec<Local>,
+    /// The first and the last vertex of every turn.
+    turns: Vec<[u32; 2]>,
+    /// Vertices that have a turn.
+    waiting: u32,
+    /// Faces from before: numbered as if every split made two, and as they are.
+    outside: Vec<[u32; 2]>,
+    /// The last of them that was named.
+    named: i64,
+    /// The first face of every split of the chunk.
+    made: Vec<u32>,
+    // What is learned.
+    wait: [Nibble; 3],
+    more: Number,
+    kinds: [Nibble; 2],
+    code: Nibble,
+    edges: [Nibble; 16],
+    near: [Nibble; 2],
+    far: [Nibble; 4],
+    second: [Bit; 2],
+    level: [Nibble; TOPS],
+    places: [[Nibble; LENGTHS]; 3],
+}
+
+impl Codec {
+    fn new(head: &MeshHead, first: u32, axes: [Axis; 3]) -> Codec {
+        Codec {
+            base_vertices: head.base_vertices,
+            base_faces: head.base_faces,
+            first,
+            axes,
+            shifts: [0; 3],
+            codes: Vec::new(),
+            levels: [0; 2],
+            of: Vec::new(),
+            turns: Vec::new(),
+            waiting: 0,
+            outside: Vec::new(),
+            named: 0,
+            made: Vec::new(),
+            wait: Default::default(),
+            more: Number::default(),
+            kinds: Default::default(),
+            code: Nibble::default(),
+            edges: Default::default(),
+            near: Default::default(),
+            far: Default::default(),
+            second: Default::default(),
+            level: Default::default(),
+            places: Default::default(),
+        }
+    }
+
+    /// What the splits share: codes, levels, lengths.
+    fn head<C: Coder>(&mut self, c: &mut [C; STREAMS], plan: Option<&Plan<'_>>) -> Option<()> {
+        let codes = plan.map_or(&[][..], |p| &p.codes);
+        let count = c[CONNECTIVITY].plain(4, codes.len() as u32) as usize;
+        for k in 0..count {
+            let code = c[CONNECTIVITY].plain(16, codes.get(k).copied().unwrap_or_default().into());
+            self.codes.push(code as u16);
+        }
+        let levels = plan.map_or([0; 2], |p| {
+            let of = || p.rows.level.iter().copied();
+            [of().min().unwrap_or(0), of().max().unwrap_or(0)]
+        });
+        self.levels = levels.map(|l| c[ERRORS].plain(16, l.into()) as u16);
+        for axis in 0..3 {
+            self.shifts[axis] = c[PLACES].plain(6, plan.map_or(0, |p| p.shifts[axis]));
+        }
+        (self.levels[0] <= self.levels[1] && self.levels[1] <= MOST_LEVEL).then_some(())
+    }
+
+    /// Vertices from before that are split, with their turns; `count` splits follow.
+    fn roots<C: Coder>(&mut self, c: &mut C, plan: Option<&Plan<'_>>, count: u32) -> Option<()> {
+        let roots = plan.map_or(&[][..], |p| &p.roots);
+        let before = self.base_vertices + self.first;
+        let mut gap = Number::default();
+        let number = c.number(&mut gap, roots.len() as u64);
+        if number > u64::from(count) || number > u64::from(before) {
+            return None;
+        }
+        let mut gaps = Number::default();
+        let mut next = 0u32;
+        self.of.reserve_exact(number as usize + count as usize);
+        for k in 0..number as usize {
+            let (v, split) = roots.get(k).copied().unwrap_or_default();
+            let gap = c.number(&mut gaps, u64::from(v.wrapping_sub(next)));
+            let vertex = u32::try_from(gap).ok()?.checked_add(next).filter(|&v| v < before)?;
+            next = vertex + 1;
+            let wait = self.wait(c, 0, plan.map(|p| p.turn[split as usize]))??;
+            self.of.push(Local {
+                vertex,
+                behind: NONE,
+                last: NONE,
+                level: self.levels[1],
+                lengths: [0; 3],
+                place: [0; 3],
+            });
+            self.come(k as u32, wait, count)?;
+            if c.spent() {
+                return None;
+            }
+        }
+        Some(())
+    }
+
+    /// Faces from before that cuts name.
+    fn faces<C: Coder>(&mut self, c: &mut C, head: &MeshHead, plan: Option<&Plan<'_>>, count: u32) -> Option<()> {
+        let faces = plan.map_or(&[][..], |p| &p.outside);
+        let end = self.base_faces.checked_add(self.first.checked_mul(2)?)?;
+        let number = c.number(&mut Number::default(), faces.len() as u64);
+        if number > 2 * u64::from(count) || number > u64::from(end) {
+            return None;
+        }
+        let mut gaps = Number::default();
+        let (mut next, mut singles, mut single) = (0u32, Singles::new(head), NONE);
+        self.outside.reserve_exact(number as usize);
+        for k in 0..number as usize {
+            let face = faces.get(k).copied().unwrap_or_default();
+            let gap = c.number(&mut gaps, u64::from(face.wrapping_sub(next)));
+            let face = u32::try_from(gap).ok()?.checked_add(next).filter(|&f| f < end)?;
+            next = face + 1;
+            let real = match face.checked_sub(self.base_faces) {
+                None => face,
+                Some(_) if !C::READS => face,
+                Some(k) => {
+                    let (i, second) = (k / 2, k % 2);
+                    if i != single && singles.is(i) {
+                        single = i;
+                    }
+                    if i == single && second == 1 {
+                        return None;
+                    }
+                    // Its own face is counted already.
+                    face - (singles.so_far() - u32::from(i == single))
+                }
+            };
+            self.outside.push([face, real]);
+            if c.spent() {
+                return None;
+            }
+        }
+        Some(())
+    }
+
+    /// In how many turns a vertex is split; `None`: in none of this chunk. The outer: damage.
+    #[inline(always)]
+    fn wait<C: Coder>(&mut self, c: &mut C, kind: usize, turns: Option<u32>) -> Option<Option<u32>> {
+        match c.nibble(&mut self.wait[kind], turns.map_or(NEVER, |t| t.min(MORE))) {
+            NEVER => Some(None),
+            MORE => {
+                let more = c.number(&mut self.more, u64::from(turns.unwrap_or(0).saturating_sub(MORE)));
+                u32::try_from(more).ok()?.checked_add(MORE).map(Some)
+            }
+            turns => Some(Some(turns)),
+        }
+    }
+
+    /// Vertex `v` is split in a turn, behind those that are already.
+    #[inline(always)]
+    fn come(&mut self, v: u32, turn: u32, count: u32) -> Option<()> {
+        // Every turn has a split.
+        if turn >= count || self.waiting >= count {
+            return None;
+        }
+        self.waiting += 1;
+        let turn = turn as usize;
+        if self.turns.len() <= turn {
+            self.turns.resize(turn + 1, [NONE; 2]);
+        }
+        let [first, last] = &mut self.turns[turn];
+        match self.of.get_mut(*last as usize) {
+            Some(before) => before.behind = v,
+            None => *first = v,
+        }
+        *last = v;
+        Some(())
+    }
+
+    /// The face of a cut, given how it is named: numbered as if every split made two, and as it is.
+    #[inline(always)]
+    fn face<C: Coder>(
+        &mut self,
+        c: &mut C,
+        (side, kind, last): (usize, u32, u32),
+        k: u32,
+        wanted: u32,
+    ) -> Option<u32> {
+        let own = self.base_faces.wrapping_add(2 * self.first);
+        match kind {
+            INSIDE => {
+                let shift = shift_for(2 * u64::from(k));
+                let (back, _) = sized(c, &mut self.near[side], shift, u64::from((own + 2 * k).wrapping_sub(wanted)));
+                let second = (back & 1) as u32;
+                let m = u64::from(k).checked_sub(back.checked_add(1)? / 2)? as u32;
+                self.made_by(m, second).filter(|_| m < k)
+            }
+            PARENT => {
+                let second = u32::from(c.bit(&mut self.second[side], wanted.wrapping_sub(own) & 1 == 1));
+                self.made_by(last, second)
+            }
+            OUTSIDE => {
+                let model = side << 1 | usize::from(last == NONE);
+                let number = self.outside.len() as u64;
+                let at = if C::READS { 0 } else { self.outside.binary_search_by_key(&wanted, |o| o[0]).ok()? as i64 };
+                let step = zigzag(at - self.named);
+                let (step, _) = sized(c, &mut self.far[model], shift_for(2 * number), step);
+                self.named = self.named.checked_add(unzigzag(step))?;
+                self.outside.get(usize::try_from(self.named).ok()?).map(|o| o[1])
+            }
+            _ => None,
+        }
+    }
+
+    /// A face of a split of the chunk; it may have one only.
+    #[inline(always)]
+    fn made_by(&self, m: u32, second: u32) -> Option<u32> {
+        let &first = self.made.get(m as usize)?;
+        // The lowest bit says whether there are two.
+        (second <= first & 1).then_some((first >> 1) + second)
+    }
+
+    /// A level of error: mostly a little below that of the split before at the vertex.
+    #[inline(always)]
+    fn level<C: Coder>(&mut self, c: &mut C, top: u16, level: u16) -> Option<u16> {
+        let [least, most] = self.levels;
+        let top = top.min(most);
+        let model = &mut self.level[usize::from(top.saturating_sub(least)).min(TOPS - 1)];
+        let down = c.nibble(model, top.wrapping_sub(level).min(FAR).into()) as u16;
+        let level = if down < FAR { top.checked_sub(down)? } else { c.plain(9, level.into()) as u16 };
+        Some(level).filter(|&l| l <= MOST_LEVEL)
+    }
+
+    /// Codes all splits. A reader gets of each the vertex, the cuts, the code, the level and the place.
+    fn splits<C: Coder>(
+        &mut self,
+        c: &mut [C; STREAMS],
+        head: &MeshHead,
+        count: u32,
+        plan: Option<&Plan<'_>>,
+        mut out: impl FnMut(u32, [u32; 2], SplitCode, u16, [f64; 3]),
+    ) -> Option<()> {
+        let mut singles = Singles::new(head);
+        let (mut turn, mut before) = (0usize, [0i64; 3]);
+        let mut face = if C::READS { head.first_face(self.first) } else { 0 };
+        let mut next = self.turns.first().map_or(NONE, |t| t[0]);
+        self.made.reserve_exact(count as usize);
+        for k in 0..count {
+            // Who is next.
+            while next == NONE {
+                turn += 1;
+                next = self.turns.get(turn)?[0];
+            }
+            let v = next as usize;
+            let at = *self.of.get(v)?;
+            if let Some(p) = plan
+                && p.rows.vertex[k as usize] != at.vertex
+            {
+                return None;
+            }
+            let wanted = plan.map(|p| {
+                let (rows, k) = (p.rows, k as usize);
+                (rows.cuts[k], rows.code[k], rows.level[k], rows.place[k])
+            });
+            let (cuts, code, level, place) = wanted.unwrap_or(([0; 2], SplitCode(0), 0, [0.0; 3]));
+            // Whether both vertices are split again.
+            let mut waits = [None; 2];
+            for side in 0..2 {
+                let wanted = plan.and_then(|p| {
+                    let next = p.next[k as usize][side];
+                    p.turn.get(next as usize).map(|t| t - p.turn[k as usize] - 1)
+                });
+                waits[side] = self.wait(&mut c[CONNECTIVITY], 1 + side, wanted)?;
+            }
+            let (code, cuts) = self.references(&mut c[CONNECTIVITY], k, at.last, code, cuts)?;
+            let level = self.level(&mut c[ERRORS], at.level, level)?;
+            // The place, seen from that of the vertex, or else from that made before.
+            let near = if at.lengths[0] == 0 { before } else { at.place };
+            let (mut numbers, mut lengths, mut point) = ([0; 3], [0; 3], [0.0; 3]);
+            for axis in 0..3 {
+                let of = &self.axes[axis];
+                let value = if C::READS { 0 } else { of.number(place[axis])? };
+                let model = &mut self.places[axis][usize::from(at.lengths[axis]) & 15];
+                let residual = zigzag(of.wrap(value.wrapping_sub(near[axis])));
+                let (residual, symbol) = sized(&mut c[PLACES], model, self.shifts[axis], residual);
+                numbers[axis] = of.wrap(near[axis].wrapping_add(unzigzag(residual)));
+                lengths[axis] = 1 + symbol.min(14) as u8;
+                point[axis] = of.at(numbers[axis]);
+            }
+            before = numbers;
+            if C::READS {
+                if code.two_faces() == singles.is(self.first + k) {
+                    return None;
+                }
+                out(at.vertex, cuts, code, level, point);
+            }
+            self.made.push(face << 1 | u32::from(code.two_faces()));
+            face = face.wrapping_add(1 + u32::from(code.two_faces()));
+            next = at.behind;
+            let u = self.of.len() as u32;
+            let old = Local {
+                behind: NONE,
+                last: k,
+                level,
+                lengths,
+                place: if at.lengths[0] == 0 { numbers } else { at.place },
+                ..at
+            };
+            self.of[v] = old;
+            self.of.push(Local { vertex: self.base_vertices + self.first + k, place: numbers, ..old });
+            for (v, wait) in [v as u32, u].into_iter().zip(waits) {
+                if let Some(wait) = wait {
+                    self.come(v, u32::try_from(turn).ok()?.checked_add(wait)?.checked_add(1)?, count)?;
+                }
+            }
+            if C::READS && k as usize % CHECKED == CHECKED - 1 && c.iter().any(Coder::spent) {
+                return None;
+            }
+        }
+        (self.waiting == count).then_some(())
+    }
+
+    /// The code of split `k` and its cuts; `last` is the split of the chunk before at its vertex.
+    #[inline(always)]
+    fn references<C: Coder>(
+        &mut self,
+        c: &mut C,
+        k: u32,
+        last: u32,
+        code: SplitCode,
+        wanted: [u32; 2],
+    ) -> Option<(SplitCode, [u32; 2])> {
+        let known = self.codes.iter().position(|&x| x == code.0).unwrap_or(CODES);
+        let symbol = c.nibble(&mut self.code, known as u32) as usize;
+        let code = match self.codes.get(symbol) {
+            Some(&code) => code,
+            None if symbol == CODES => c.plain(16, code.0.into()) as u16,
+            None => return None,
+        };
+        let code = SplitCode(code);
+        let own = self.base_faces.wrapping_add(2 * self.first);
+        let kind = |cut: u32| match (cut >> 2).checked_sub(own) {
+            _ if cut == NONE => NO_CUT,
+            None => OUTSIDE,
+            Some(f) if f / 2 == last => PARENT,
+            Some(_) => INSIDE,
+        };
+        let [l, r] = if C::READS { [0; 2] } else { wanted.map(kind) };
+        let kinds = c.nibble(&mut self.kinds[usize::from(last == NONE)], l << 2 | r);
+        let [l, r] = [kinds >> 2, kinds & 3];
+        if l == NO_CUT || (r == NO_CUT) == code.two_faces() {
+            return None;
+        }
+        let edges = (wanted[0] & 3) << 2 | wanted[1] & 3;
+        let edges = c.nibble(&mut self.edges[symbol & 15], edges);
+        let [a, b] = [edges >> 2, edges & 3];
+        let left = self.face(c, (0, l, last), k, wanted[0] >> 2)? << 2 | a;
+        let right = match r {
+            NO_CUT => NONE,
+            _ => self.face(c, (1, r, last), k, wanted[1] >> 2)? << 2 | b,
+        };
+        (a < 3 && (b < 3 || r == NO_CUT)).then_some((code, [left, right]))
+    }
+}
+
+impl<'a> Plan<'a> {
+    /// `None` if rows contradict each other.
+    fn new(rows: &'a Rows, base: (u32, u32), axes: &[Axis; 3]) -> Option<Plan<'a>> {
+        let (n, first) = (rows.vertex.len(), rows.first);
+        let own = base.1.checked_add(first.checked_mul(2)?)?;
+        let mut plan = Plan {
+            rows,
+            turn: Vec::with_capacity(n),
+            next: vec![[NONE; 2]; n],
+            roots: Vec::new(),
+            outside: Vec::new(),
+            codes: Vec::new(),
+            shifts: [0; 3],
+        };
+        // The last split of every vertex: of those from before, and of those made.
+        let (mut of_roots, mut of_made) = (FxHashMap::default(), Vec::with_capacity(n));
+        let mut codes: FxHashMap<u16, u32> = FxHashMap::default();
+        // Places of roots, as soon as something is made beside them, and of those made; the longest residuals.
+        let (mut near, mut longest, mut before) = (FxHashMap::default(), [0u64; 3], [0i64; 3]);
+        let mut places: Vec<[i64; 3]> = Vec::with_capacity(n);
+        for k in 0..n as u32 {
+            let v = rows.vertex[k as usize];
+            let made = v.checked_sub(base.0.checked_add(first)?);
+            let last = match made {
+                Some(m) => std::mem::replace(of_made.get_mut(m as usize)?, k),
+                None => of_roots.insert(v, k).unwrap_or_else(|| {
+                    plan.roots.push((v, k));
+                    NONE
+                }),
+            };
+            of_made.push(k);
+            if let Some(next) = plan.next.get_mut(last as usize) {
+                // Its second vertex is one that was not split since.
+                next[usize::from(made == Some(last))] = k;
+            }
+            let [l, r] = rows.cuts[k as usize].map(|c| match (c >> 2).checked_sub(own) {
+                _ if c == NONE => Some(NONE),
+                None => {
+                    plan.outside.push(c >> 2);
+                    Some(NONE)
+                }
+                Some(f) => Some(f / 2).filter(|&m| m < k),
+            });
+            let needs = [last, l?, r?].into_iter().filter(|&d| d != NONE);
+            plan.turn.push(needs.map(|d| 1 + plan.turn[d as usize]).max().unwrap_or(0));
+            *codes.entry(rows.code[k as usize].0).or_default() += 1;
+            let mut at = [0; 3];
+            for axis in 0..3 {
+                at[axis] = axes[axis].number(rows.place[k as usize][axis])?;
+            }
+            let from = match made {
+                Some(m) => *places.get(m as usize)?,
+                None => *near.entry(v).or_insert(at),
+            };
+            let from = if last == NONE { before } else { from };
+            for axis in 0..3 {
+                longest[axis] = longest[axis].max(zigzag(axes[axis].wrap(at[axis].wrapping_sub(from[axis]))));
+            }
+            before = at;
+            places.push(at);
+        }
+        plan.shifts = longest.map(shift_for);
+        plan.roots.sort_unstable();
+        plan.outside.sort_unstable();
+        plan.outside.dedup();
+        let mut codes: Vec<(u16, u32)> = codes.into_iter().collect();
+        codes.sort_unstable_by_key(|&(code, n)| (std::cmp::Reverse(n), code));
+        plan.codes = codes.into_iter().take(CODES).map(|c| c.0).collect();
+        Some(plan)
+    }
+}
+
+/// The splits of a chunk in an order in which [`write`] takes them: turn by turn, each in the one behind the last of those it depends on, in a turn by what made way for them. `on` are what each
+/// depends on of the chunk, before it, or [`NONE`]; `next` the next split of its vertex and the first of that which it makes; `roots` those of vertices from before, by these ascending.
+pub(super) fn arrange(on: &[[u32; 3]], next: &[[u32; 2]], roots: &[u32]) -> Vec<u32> {
+    let mut turn: Vec<u32> = Vec::with_capacity(on.len());
+    for on in on {
+        turn.push(on.iter().filter_map(|&d| turn.get(d as usize)).map(|t| t + 1).max().unwrap_or(0));
+    }
+    let mut turns = vec![Vec::new(); turn.iter().max().map_or(0, |&t| t as usize + 1)];
+    roots.iter().for_each(|&t| turns[turn[t as usize] as usize].push(t));
+    let mut order = Vec::with_capacity(on.len());
+    for k in 0..turns.len() {
+        let now = std::mem::take(&mut turns[k]);
+        for &t in &now {
+            for &n in next[t as usize].iter().filter(|&&n| n != NONE) {
+                turns[turn[n as usize] as usize].push(n);
+            }
+        }
+        order.extend(now);
+    }
+    order
+}
+
+/// Writes a chunk; coordinates are multiples of `steps`, or floats that are, or any. `None` if the rows contradict each other, or are not in the order of [`arrange`].
+pub(super) fn write(
+    head: &MeshHead,
+    rows: &Rows,
+    steps: [f64; 3],
+    (streams, bytes): (&mut [Encoder; STREAMS], &mut Vec<u8>),
+) -> Option<Vec<u8>> {
+    let axes = std::array::from_fn(|a| Axis::of(rows.place.iter().map(|p| p[a]), steps[a], head.double));
+    let plan = Plan::new(rows, (head.base_vertices, head.base_faces), &axes)?;
+    let mut codec = Codec::new(head, rows.first, axes);
+    let count = rows.vertex.len() as u32;
+    codec.head(streams, Some(&plan))?;
+    codec.roots(&mut streams[CONNECTIVITY], Some(&plan), count)?;
+    codec.faces(&mut streams[CONNECTIVITY], head, Some(&plan), count)?;
+    codec.splits(streams, head, count, Some(&plan), |_, _, _, _, _| ())?;
+    let mut out = Vec::new();
+    axes.iter().for_each(|a| a.write(&mut out));
+    for stream in streams {
+        bytes.clear();
+        stream.finish(bytes);
+        put_varint(&mut out, bytes.len() as u64);
+        out.extend_from_slice(bytes);
+    }
+    Some(out)
+}
+
+/// Bytes that reading a chunk of so many splits takes at most on the way, besides the arrays that come of it.
+pub(crate) fn scratch(count: u32) -> u64 {
+    // Twice as many vertices as splits; turns, faces from before and faces made, the first two grow.
+    let each = 2 * size_of::<Local>() + 3 * 8 + 2 * 8 + 4;
+    each as u64 * u64::from(count) + size_of::<Codec>() as u64
+}
+
+/// Bytes of each stream.
+pub(super) fn sizes(mut bytes: &[u8]) -> Option<[u64; STREAMS]> {
+    Axis::three(&mut bytes)?;
+    let mut sizes = [0; STREAMS];
+    for size in &mut sizes {
+        *size = take_varint(&mut bytes)?;
+        bytes = bytes.get(usize::try_from(*size).ok()?..)?;
+    }
+    Some(sizes)
+}
+
+/// Reads a chunk. `None`: damage.
+pub(super) fn read(
+    head: &MeshHead,
+    (first, first_face): (u32, u32),
+    (count, raw): (u32, u64),
+    mut bytes: &[u8],
+) -> Option<SplitBlock> {
+    let end = first.checked_add(count)?;
+    let point = if head.double { 24 } else { 12 };
+    let plain = head.channels.is_none() && !head.materials && !head.groups;
+    // No more than was announced for the arrays, which goes with what is stored.
+    if end > head.splits
+        || first_face != head.first_face(first)
+        || !plain
+        || raw != u64::from(count) * (18 + point)
+        || head.base_vertices.checked_add(end).is_none()
+        || end.checked_mul(2).and_then(|f| f.checked_add(head.base_faces)).is_none_or(|f| f >= 1 << 30)
+    {
+        return None;
+    }
+    let axes = Axis::three(&mut bytes)?.map(|a| a.rounded(head.double));
+    let mut next = || {
+        let length = usize::try_from(take_varint(&mut bytes)?).ok()?;
+        let (stream, rest) = bytes.split_at_checked(length)?;
+        bytes = rest;
+        Decoder::new(stream)
+    };
+    let mut streams = [next()?, next()?, next()?];
+    let mut out = SplitBlock {
+        first,
+        first_face,
+        first_wedge: head.base_wedges,
+        new_positions: places::empty(head.double),
+        moved_positions: places::empty(head.double),
+        ..SplitBlock::default()
+    };
+    out.reserve(count as usize);
+    let mut codec = Codec::new(head, first, axes);
+    codec.head(&mut streams, None)?;
+    codec.roots(&mut streams[CONNECTIVITY], None, count)?;
+    codec.faces(&mut streams[CONNECTIVITY], head, None, count)?;
+    codec.splits(&mut streams, head, count, None, |vertex, [left, right], code, level, place| {
+        out.splits.vertex.push(vertex);
+        out.splits.left.push(left);
+        out.splits.right.push(right);
+        out.splits.code.push(code);
+        out.splits.error.push(f32::from_bits(u32::from(level) << ERROR_SHIFT));
+        places::push(&mut out.new_positions, place);
+    })?;
+    Some(out).filter(|_| !streams.iter().any(Coder::spent))
+}
