@@ -133,7 +133,7 @@ impl Tree {
 }
 
 /// Splits of a chunk, as in other files.
-const CHUNK: usize = 16_384;
+const CHUNK: usize = 4096;
 
 const NO_BOUNDS: Packed = Packed { error: 0, radius: 0, cone: Cone(0) };
 
