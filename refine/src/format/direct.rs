@@ -8,7 +8,9 @@ mod axis;
 
 pub(super) use self::axis::Axis;
 use super::base::{MeshHead, Singles};
-use super::coder::{Bit, Coder, Decoder, Encoder, Nibble, Number, low_mask, put_varint, take_varint, unzigzag, zigzag};
+use super::coder::{
+    Bit, Coder, Decoder, Encoder, Nibble, Number, low_mask, put_varint, take_varint, unzigzag, zigzag,
+};
 use super::places;
 use super::splits::{CONNECTIVITY, ERROR_SHIFT, ERRORS, MOST_LEVEL, PLACES, SplitBlock};
 use crate::aif::NONE;
@@ -219,7 +221,13 @@ impl Codec {
     }
 
     /// Faces from before that cuts name.
-    fn faces<C: Coder>(&mut self, c: &mut C, head: &MeshHead, plan: Option<&Plan<'_>>, count: u32) -> Option<()> {
+    fn faces<C: Coder>(
+        &mut self,
+        c: &mut C,
+        head: &MeshHead,
+        plan: Option<&Plan<'_>>,
+        count: u32,
+    ) -> Option<()> {
         let faces = plan.map_or(&[][..], |p| &p.outside);
         let end = self.base_faces.checked_add(self.first.checked_mul(2)?)?;
         let number = c.number(&mut Number::default(), faces.len() as u64);
@@ -304,7 +312,8 @@ impl Codec {
         match kind {
             INSIDE => {
                 let shift = shift_for(2 * u64::from(k));
-                let (back, _) = sized(c, &mut self.near[side], shift, u64::from((own + 2 * k).wrapping_sub(wanted)));
+                let (back, _) =
+                    sized(c, &mut self.near[side], shift, u64::from((own + 2 * k).wrapping_sub(wanted)));
                 let second = (back & 1) as u32;
                 let m = u64::from(k).checked_sub(back.checked_add(1)? / 2)? as u32;
                 self.made_by(m, second).filter(|_| m < k)
@@ -316,7 +325,11 @@ impl Codec {
             OUTSIDE => {
                 let model = side << 1 | usize::from(last == NONE);
                 let number = self.outside.len() as u64;
-                let at = if C::READS { 0 } else { self.outside.binary_search_by_key(&wanted, |o| o[0]).ok()? as i64 };
+                let at = if C::READS {
+                    0
+                } else {
+                    self.outside.binary_search_by_key(&wanted, |o| o[0]).ok()? as i64
+                };
                 let step = zigzag(at - self.named);
                 let (step, _) = sized(c, &mut self.far[model], shift_for(2 * number), step);
                 self.named = self.named.checked_add(unzigzag(step))?;
@@ -665,4 +678,220 @@ pub(super) fn read(
         places::push(&mut out.new_positions, place);
     })?;
     Some(out).filter(|_| !streams.iter().any(Coder::spent))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const BASE: (u32, u32) = (5, 3);
+
+    /// Splits before the chunk, and those of it: which vertex, which faces, as shares of what there is; the edges; one face only; the level; the place.
+    type Given = (Vec<bool>, Vec<(f64, [f64; 2], u8, bool, u16, [i16; 3])>);
+
+    fn given() -> impl Strategy<Value = Given> {
+        let share = 0.0..1.0f64;
+        let split = (
+            share.clone(),
+            [share.clone(), share],
+            0u8..9,
+            prop::bool::weighted(0.1),
+            0..=MOST_LEVEL,
+            prop::array::uniform3(any::<i16>()),
+        );
+        (prop::collection::vec(any::<bool>(), 0..40), prop::collection::vec(split, 1..80))
+    }
+
+    /// A head, rows in the order of [`arrange`], and what is to be read.
+    fn rows(
+        (before, splits): &Given,
+        double: bool,
+        place: impl Fn([i16; 3]) -> [f64; 3],
+    ) -> (MeshHead, Rows, SplitBlock) {
+        let (first, n) = (before.len() as u32, splits.len());
+        let own = BASE.1 + 2 * first;
+        // As they come: vertices and faces of the chunk are numbered behind those before.
+        let mut last: Vec<u32> = vec![NONE; (BASE.0 + first) as usize];
+        let mut faces: Vec<u32> = (0..BASE.1).collect();
+        for (i, &single) in (0..first).zip(before) {
+            faces.push(BASE.1 + 2 * i);
+            faces.extend(Some(BASE.1 + 2 * i + 1).filter(|_| !single));
+        }
+        let (mut on, mut next, mut roots) = (vec![], vec![[NONE; 2]; n], vec![]);
+        let mut all = vec![];
+        for (t, &(v, cuts, edges, single, level, at)) in (0u32..).zip(splits) {
+            let v = (v * last.len() as f64) as usize;
+            let before = std::mem::replace(&mut last[v], t);
+            match next.get_mut(before as usize) {
+                Some(next) => next[usize::from(v as u32 == BASE.0 + first + before)] = t,
+                None => roots.push((v, t)),
+            }
+            let cuts = cuts.map(|c| faces[(c * faces.len() as f64) as usize]);
+            let maker = |f: u32| f.checked_sub(own).map_or(NONE, |f| f / 2);
+            let right = if single { NONE } else { cuts[1] << 2 | u32::from(edges % 3) };
+            on.push([before, maker(cuts[0]), if single { NONE } else { maker(cuts[1]) }]);
+            // More codes than have symbols.
+            let code =
+                u16::from(edges) << 7 | at[0] as u16 & 7 | if single { 0 } else { SplitCode::TWO_FACES };
+            all.push((
+                v as u32,
+                [cuts[0] << 2 | u32::from(edges / 3), right],
+                SplitCode(code),
+                level,
+                place(at),
+            ));
+            last.push(t);
+            faces.push(own + 2 * t);
+            faces.extend(Some(own + 2 * t + 1).filter(|_| !single));
+        }
+        roots.sort_unstable();
+        let order = arrange(&on, &next, &roots.iter().map(|r| r.1).collect::<Vec<_>>());
+        assert_eq!(order.len(), n);
+        let mut slot = vec![0; n];
+        order.iter().zip(0..).for_each(|(&t, k)| slot[t as usize] = k);
+        let mut single: Vec<u32> = before.iter().zip(0..).filter(|(s, _)| **s).map(|(_, i)| i).collect();
+        single.extend(order.iter().zip(first..).filter(|(t, _)| splits[**t as usize].3).map(|(_, i)| i));
+        let head = MeshHead {
+            splits: first + n as u32,
+            base_vertices: BASE.0,
+            base_faces: BASE.1,
+            base_wedges: BASE.0,
+            double,
+            single,
+            ..MeshHead::default()
+        };
+        let mut rows = Rows { first, ..Rows::default() };
+        let mut want = SplitBlock {
+            first,
+            first_face: head.first_face(first),
+            first_wedge: BASE.0,
+            new_positions: places::empty(double),
+            moved_positions: places::empty(double),
+            ..SplitBlock::default()
+        };
+        for &t in &order {
+            let (v, cuts, code, level, place) = all[t as usize];
+            let vertex = v.checked_sub(BASE.0 + first).map_or(v, |m| BASE.0 + first + slot[m as usize]);
+            let cuts = cuts.map(|c| match (c >> 2).checked_sub(own) {
+                Some(f) if c != NONE => (own + 2 * slot[f as usize / 2] + f % 2) << 2 | c & 3,
+                _ => c,
+            });
+            let [left, right] = cuts.map(|c| match (c >> 2).checked_sub(BASE.1) {
+                Some(f) if c != NONE => (head.first_face(f / 2) + f % 2) << 2 | c & 3,
+                _ => c,
+            });
+            rows.vertex.push(vertex);
+            rows.cuts.push(cuts);
+            rows.code.push(code);
+            rows.level.push(level);
+            rows.place.push(place);
+            want.splits.vertex.push(vertex);
+            want.splits.left.push(left);
+            want.splits.right.push(right);
+            want.splits.code.push(code);
+            want.splits.error.push(f32::from_bits(u32::from(level) << ERROR_SHIFT));
+            places::push(&mut want.new_positions, place);
+        }
+        (head, rows, want)
+    }
+
+    fn written(head: &MeshHead, rows: &Rows, steps: [f64; 3]) -> Option<Vec<u8>> {
+        write(head, rows, steps, (&mut Default::default(), &mut Vec::new()))
+    }
+
+    fn again(head: &MeshHead, block: &SplitBlock, bytes: &[u8]) -> Option<SplitBlock> {
+        let n = block.splits.len() as u32;
+        let raw = u64::from(n) * if head.double { 42 } else { 30 };
+        read(head, (block.first, block.first_face), (n, raw), bytes)
+    }
+
+    /// Whole steps, what fits into an f32 times a step, and anything.
+    fn places_by(kind: usize, double: bool) -> impl Fn([i16; 3]) -> [f64; 3] {
+        move |at| {
+            let of = |k: usize, step: f64| match kind {
+                0 => f64::from(at[k]) * step,
+                1 => f64::from(f32::from_bits((at[k] as u32) << 11 ^ 0x4123_4567)) * step,
+                _ => f64::from_bits((at[k] as u64) << 40 ^ 0x4012_3456_789A_BCDE),
+            };
+            let x = [of(0, 1.0), of(1, 0.1), of(2, 1.25)];
+            if double { x } else { x.map(|x| f64::from(x as f32)) }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_was_written_is_read(of in given(), kind in 0usize..3, double in any::<bool>()) {
+            let (head, rows, want) = rows(&of, double, places_by(kind, double));
+            let bytes = written(&head, &rows, [1.0, 0.1, 1.25]).unwrap();
+            prop_assert_eq!(again(&head, &want, &bytes), Some(want.clone()));
+            // Whatever the steps.
+            let bytes = written(&head, &rows, [f64::NAN, -1.0, 1e300]).unwrap();
+            prop_assert_eq!(again(&head, &want, &bytes), Some(want));
+        }
+
+        #[test]
+        fn damage_is_none_or_something_else(of in given(), cut in any::<prop::sample::Index>(), bit in any::<prop::sample::Index>()) {
+            let (head, rows, want) = rows(&of, false, places_by(0, false));
+            let bytes = written(&head, &rows, [1.0; 3]).unwrap();
+            again(&head, &want, &bytes[..cut.index(bytes.len())]);
+            let mut other = bytes.clone();
+            other[bit.index(8 * bytes.len()) / 8] ^= 1 << (bit.index(8 * bytes.len()) % 8);
+            if let Some(block) = again(&head, &want, &other) {
+                // All that is referred to was made before.
+                let (mut face, s) = (block.first_face, &block.splits);
+                for k in 0..s.len() {
+                    prop_assert!(s.vertex[k] < BASE.0 + block.first + k as u32);
+                    prop_assert!(s.left[k] >> 2 < face && s.left[k] & 3 < 3);
+                    prop_assert!(s.right[k] == NONE || s.right[k] >> 2 < face && s.right[k] & 3 < 3);
+                    prop_assert_eq!(s.right[k] != NONE, s.code[k].two_faces());
+                    face += 1 + u32::from(s.code[k].two_faces());
+                }
+                prop_assert_eq!(s.len(), want.splits.len());
+            }
+        }
+    }
+
+    #[test]
+    fn another_order_is_not_written() {
+        let split = |v: f64| (v, [0.0; 2], 0, false, 5, [0; 3]);
+        let (head, mut rows, _) = rows(&(vec![], vec![split(0.0), split(0.3)]), false, places_by(0, false));
+        assert!(written(&head, &rows, [1.0; 3]).is_some());
+        rows.vertex.reverse();
+        assert!(written(&head, &rows, [1.0; 3]).is_none());
+        // Of a split that comes later.
+        rows.vertex.reverse();
+        rows.cuts[0][0] = (BASE.1 + 2) << 2;
+        assert!(written(&head, &rows, [1.0; 3]).is_none());
+    }
+
+    #[test]
+    fn splits_in_a_chain_wait_for_as_many_turns_as_there_are() {
+        // Each is cut at a face of the one before, of a vertex of its own: the last waits longer than symbols tell.
+        let mut rows = Rows::default();
+        for k in 0..30 {
+            rows.vertex.push(k);
+            rows.cuts.push([if k == 0 { 0 } else { (1 + 2 * (k - 1)) << 2 }, 0]);
+            rows.code.push(SplitCode(SplitCode::TWO_FACES));
+            rows.level.push(0);
+            rows.place.push([f64::from(k), -0.0, 1e9]);
+        }
+        let head = MeshHead { splits: 30, base_vertices: 30, base_faces: 1, ..MeshHead::default() };
+        let bytes = written(&head, &rows, [1.0; 3]).unwrap();
+        let block = read(&head, (0, 1), (30, 900), &bytes).unwrap();
+        assert_eq!(block.splits.vertex, rows.vertex);
+        assert_eq!(
+            block.new_positions.get(7).to_array().map(f64::to_bits),
+            [7.0, -0.0, 1e9].map(f64::to_bits)
+        );
+        // Beside three axes and lengths of streams.
+        let streams = sizes(&bytes).unwrap().iter().sum::<u64>() as usize;
+        assert!((3..=6).contains(&(bytes.len() - 27 - streams)));
+        // What is announced is what is there.
+        assert!(read(&head, (0, 1), (29, 870), &bytes).is_none());
+        assert!(read(&head, (0, 1), (30, 899), &bytes).is_none());
+        assert!(read(&head, (0, 0), (30, 900), &bytes).is_none());
+        let with = MeshHead { groups: true, ..head.clone() };
+        assert!(read(&with, (0, 1), (30, 900), &bytes).is_none());
+    }
 }

@@ -442,40 +442,6 @@ fn ranks(pm: &ProgressiveMesh, base: &[u32]) -> Vec<u32> {
     rank
 }
 
-/// The place of a vertex in the order of descent, as far as its own ancestors tell: so chunks that know only some vertices agree about them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Label {
-    pub(super) at: u64,
-    pub(super) splits: u8,
-}
-
-impl Label {
-    /// Of the vertex of the base that is the `k`-th along the curve.
-    pub(super) fn base(k: u32) -> Label {
-        Label { at: (k as u64) << 32, splits: 0 }
-    }
-
-    /// Halves what the vertex has for its descendants, and gives the new one the upper half; beyond 32 times they share a place.
-    #[inline]
-    pub(super) fn split(&mut self) -> Label {
-        self.splits = self.splits.saturating_add(1).min(33);
-        Label { at: self.at + (1u64 << 32 >> self.splits), splits: self.splits }
-    }
-
-    /// What counts, with the vertex's number.
-    #[inline]
-    pub(super) fn key(self) -> u64 {
-        self.at
-    }
-}
-
-/// Labels of the base's vertices, given their order.
-pub(super) fn labels(base: &[u32]) -> Vec<Label> {
-    let mut labels = vec![Label::default(); base.len()];
-    base.iter().zip(0..).for_each(|(&v, k)| labels[v as usize] = Label::base(k));
-    labels
-}
-
 /// Makes the order, chunk by chunk. Splits go by where they stand among the nodes.
 struct Schedule<'a> {
     nodes: Vec<Node>,
@@ -549,44 +515,6 @@ impl Schedule<'_> {
                 self.done[i as usize] = true;
                 self.order.push(self.splits[i as usize]);
                 list.extend([node.again, node.first].into_iter().filter(|&i| here(i)));
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn labels_go_in_the_order_of_descent_whatever_else_is_known(
-            picks in prop::collection::vec((any::<prop::sample::Index>(), any::<bool>()), 0..120),
-        ) {
-            // Everything, and only those of the vertices' ancestors that were picked.
-            let mut list = vec![0usize, 1, 2];
-            let mut labels: Vec<Label> = (0..3).map(Label::base).collect();
-            let mut part: Vec<Option<Label>> = labels.iter().copied().map(Some).collect();
-            for (pick, known) in picks {
-                let v = pick.index(labels.len());
-                list.insert(list.iter().position(|&x| x == v).unwrap() + 1, labels.len());
-                let new = labels[v].split();
-                labels.push(new);
-                // A split that is known needs all before it at its vertex.
-                let before = part[v].filter(|p| known && p.splits + 1 == labels[v].splits);
-                let new = before.map(|mut p| {
-                    let new = p.split();
-                    part[v] = Some(p);
-                    new
-                });
-                part.push(new);
-            }
-            let mut order: Vec<usize> = (0..labels.len()).collect();
-            order.sort_by_key(|&v| (labels[v].key(), v));
-            prop_assert!(order == list || labels.iter().any(|l| l.splits > 32));
-            for (own, all) in part.iter().zip(&labels) {
-                prop_assert!(own.is_none_or(|own| own.key() == all.key()));
             }
         }
     }

@@ -181,15 +181,7 @@ impl<'a> Path<'a> {
         let vertex = |node| Vertex { last: NONE, node, next: Next::NOTHING };
         let vertices = (0..tree.head.base_vertices).map(vertex).collect();
         let head = MeshHead { splits: 0, ..tree.head.clone() };
-        Path {
-            tree,
-            head,
-            mesh: tree.base.clone(),
-            tips: vec![],
-            vertices,
-            names: vec![],
-            parts: vec![],
-        }
+        Path { tree, head, mesh: tree.base.clone(), tips: vec![], vertices, names: vec![], parts: vec![] }
     }
 
     /// Vertices of the mesh.

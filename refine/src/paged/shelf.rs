@@ -6,8 +6,8 @@ use super::page::{Base, Page, Record, RowRef};
 use super::pool::{APPLIED, Hot, LED, NEEDS, Pool};
 use crate::aif::NONE;
 use crate::format::{
-    ByteRanges, CONTRADICTS, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, Room, direct, pages,
-    read_piece, read_piece_within,
+    ByteRanges, CONTRADICTS, Chunk, ChunkType, FormatError, MeshHead, Piece, RangeReader, Room, direct,
+    pages, read_piece, read_piece_within,
 };
 use crate::hierarchy::{Guarantee, Packed};
 use crate::progressive::{Damage, Fans, link_faces};

@@ -140,8 +140,6 @@ pub(in super::super) struct Sources<'a> {
     chunks: &'a [u32],
     /// Where vertices are at last.
     places: &'a [[f64; 3]],
-    /// Of runs of splits that are numbered otherwise in the file: the first here, and there.
-    names: &'a [[u32; 2]],
     first: u32,
     first_face: u32,
     /// Splits of the context, ascending; a bit for each split, whether it is one; of each that is its place there.
@@ -174,7 +172,6 @@ impl<'a> Sources<'a> {
             on,
             chunks,
             places,
-            names: &[],
             first: 0,
             first_face: 0,
             ids: Vec::new(),
@@ -183,19 +180,6 @@ impl<'a> Sources<'a> {
             faces: Vec::new(),
             maker,
         }
-    }
-
-    /// With the splits here numbered otherwise than in the file, though in the same order: of runs of them the first here, and there.
-    pub(in super::super) fn with_names(mut self, names: &'a [[u32; 2]]) -> Self {
-        self.names = names;
-        self
-    }
-
-    /// The number of a split in the file.
-    #[inline]
-    fn name(&self, i: u32) -> u32 {
-        let run = self.names.partition_point(|n| n[0] <= i).checked_sub(1);
-        run.map_or(i, |k| self.names[k][1] + (i - self.names[k][0]))
     }
 
     /// All splits before `range` that those in it depend on.
@@ -324,9 +308,9 @@ impl Codec<'_> {
             self.begin(&mut c[CONNECTIVITY], &of, count as usize)?;
             for k in 0..count as usize {
                 let wanted = sources.as_ref().map(|s| s.wanted(pm, part[k]));
-                let own = sources.as_ref().zip(part.get(k));
+                let own = part.get(k);
                 let (v, state) = self.sweep(&mut c[CONNECTIVITY], wanted.map_or(NONE, |w| w.vertex))?;
-                let gap = own.map_or(0, |(s, &i)| s.name(i) - next);
+                let gap = own.map_or(0, |&i| i - next);
                 let m = &mut self.m.context;
                 let class =
                     near as usize | ((self.marks & MARKED > 0) as usize) << 1 | ((state > 0) as usize) << 2;
@@ -338,8 +322,6 @@ impl Codec<'_> {
                 let gap = if near { 0 } else { c[CONNECTIVITY].number(&mut m.gap, gap as u64) };
                 let id = u32::try_from(gap).ok()?.checked_add(next)?;
                 next = id.checked_add(1)?;
-                // Here a writer may number splits otherwise.
-                let id = own.map_or(id, |o| *o.1);
                 if id >= known.first {
                     return None;
                 }

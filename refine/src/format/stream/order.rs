@@ -183,7 +183,8 @@ impl Path<'_> {
             Some(&chunk) if chunk == number => order.slot[k as usize],
             _ => NONE,
         };
-        let on: Vec<_> = chosen.iter().map(|&t| order.on[t as usize].map(|d| own(d).map_or(NONE, here))).collect();
+        let on: Vec<_> =
+            chosen.iter().map(|&t| order.on[t as usize].map(|d| own(d).map_or(NONE, here))).collect();
         let next: Vec<_> = chosen.iter().map(|&t| order.next[t as usize].map(here)).collect();
         for k in direct::arrange(&on, &next, &roots) {
             let t = chosen[k as usize];
