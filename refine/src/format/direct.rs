@@ -457,7 +457,7 @@ impl Codec {
         code: SplitCode,
         wanted: [u32; 2],
     ) -> Option<(SplitCode, [u32; 2])> {
-        let known = self.codes.iter().position(|&x| x == code.0).unwrap_or(CODES);
+        let known = if C::READS { 0 } else { self.codes.iter().position(|&x| x == code.0).unwrap_or(CODES) };
         let symbol = c.nibble(&mut self.code, known as u32) as usize;
         let code = match self.codes.get(symbol) {
             Some(&code) => code,

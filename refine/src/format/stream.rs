@@ -132,7 +132,7 @@ impl Tree {
     }
 }
 
-/// Splits of a chunk, as in other files.
+/// Splits of a chunk. With 16,384 the fast lemniscate over generated terrain of 4,097 x 4,097 decodes 687,000 splits instead of 570,000, and the longest frame takes half as long again or twice as long; with 2,048 the longest is shorter by a quarter, and all frames take as long. Files are as large.
 const CHUNK: usize = 4096;
 
 const NO_BOUNDS: Packed = Packed { error: 0, radius: 0, cone: Cone(0) };
