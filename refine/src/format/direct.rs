@@ -392,12 +392,12 @@ impl Codec {
             let (cuts, code, level, place) = wanted.unwrap_or(([0; 2], SplitCode(0), 0, [0.0; 3]));
             // Whether both vertices are split again.
             let mut waits = [None; 2];
-            for side in 0..2 {
+            for (side, wait) in waits.iter_mut().enumerate() {
                 let wanted = plan.and_then(|p| {
                     let next = p.next[k as usize][side];
                     p.turn.get(next as usize).map(|t| t - p.turn[k as usize] - 1)
                 });
-                waits[side] = self.wait(&mut c[CONNECTIVITY], 1 + side, wanted)?;
+                *wait = self.wait(&mut c[CONNECTIVITY], 1 + side, wanted)?;
             }
             let (code, cuts) = self.references(&mut c[CONNECTIVITY], k, at.last, code, cuts)?;
             let level = self.level(&mut c[ERRORS], at.level, level)?;
