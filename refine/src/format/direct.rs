@@ -390,30 +390,25 @@ impl Codec {
                 (rows.cuts[k], rows.code[k], rows.level[k], rows.place[k])
             });
             let (cuts, code, level, place) = wanted.unwrap_or(([0; 2], SplitCode(0), 0, [0.0; 3]));
-            // Whether both vertices are split again.
-            let mut waits = [None; 2];
-            for (side, wait) in waits.iter_mut().enumerate() {
-                let wanted = plan.and_then(|p| {
+            // In an order in which no stream is waited for while another could be read.
+            let wait = |side: usize| {
+                plan.and_then(|p| {
                     let next = p.next[k as usize][side];
                     p.turn.get(next as usize).map(|t| t - p.turn[k as usize] - 1)
-                });
-                *wait = self.wait(&mut c[CONNECTIVITY], 1 + side, wanted)?;
-            }
-            let (code, cuts) = self.references(&mut c[CONNECTIVITY], k, at.last, code, cuts)?;
-            let level = self.level(&mut c[ERRORS], at.level, level)?;
+                })
+            };
             // The place, seen from that of the vertex, or else from that made before.
             let near = if at.lengths[0] == 0 { before } else { at.place };
-            let (mut numbers, mut lengths, mut point) = ([0; 3], [0; 3], [0.0; 3]);
-            for axis in 0..3 {
-                let of = &self.axes[axis];
-                let value = if C::READS { 0 } else { of.number(place[axis])? };
-                let model = &mut self.places[axis][usize::from(at.lengths[axis]) & 15];
-                let residual = zigzag(of.wrap(value.wrapping_sub(near[axis])));
-                let (residual, symbol) = sized(&mut c[PLACES], model, self.shifts[axis], residual);
-                numbers[axis] = of.wrap(near[axis].wrapping_add(unzigzag(residual)));
-                lengths[axis] = 1 + symbol.min(14) as u8;
-                point[axis] = of.at(numbers[axis]);
-            }
+            let of_axis = |a: usize| (near[a], at.lengths[a], place[a]);
+            let again = self.wait(&mut c[CONNECTIVITY], 1, wait(0))?;
+            let x = self.coordinate(&mut c[PLACES], 0, of_axis(0))?;
+            let new = self.wait(&mut c[CONNECTIVITY], 2, wait(1))?;
+            let y = self.coordinate(&mut c[PLACES], 1, of_axis(1))?;
+            let (symbol, code) = self.code(&mut c[CONNECTIVITY], code)?;
+            let z = self.coordinate(&mut c[PLACES], 2, of_axis(2))?;
+            let level = self.level(&mut c[ERRORS], at.level, level)?;
+            let cuts = self.references(&mut c[CONNECTIVITY], (k, at.last), (symbol, code), cuts)?;
+            let (numbers, lengths, point) = ([x.0, y.0, z.0], [x.1, y.1, z.1], [x.2, y.2, z.2]);
             before = numbers;
             if C::READS {
                 if code.two_faces() == singles.is(self.first + k) {
@@ -435,7 +430,7 @@ impl Codec {
             };
             self.of[v] = old;
             self.of.push(Local { vertex: self.base_vertices + self.first + k, place: numbers, ..old });
-            for (v, wait) in [v as u32, u].into_iter().zip(waits) {
+            for (v, wait) in [v as u32, u].into_iter().zip([again, new]) {
                 if let Some(wait) = wait {
                     self.come(v, u32::try_from(turn).ok()?.checked_add(wait)?.checked_add(1)?, count)?;
                 }
@@ -447,16 +442,26 @@ impl Codec {
         (self.waiting == count).then_some(())
     }
 
-    /// The code of split `k` and its cuts; `last` is the split of the chunk before at its vertex.
+    /// A coordinate near a number, where the last residual had such a length: its number, how long the residual is, and itself.
     #[inline(always)]
-    fn references<C: Coder>(
+    fn coordinate<C: Coder>(
         &mut self,
         c: &mut C,
-        k: u32,
-        last: u32,
-        code: SplitCode,
-        wanted: [u32; 2],
-    ) -> Option<(SplitCode, [u32; 2])> {
+        axis: usize,
+        (near, length, value): (i64, u8, f64),
+    ) -> Option<(i64, u8, f64)> {
+        let of = &self.axes[axis];
+        let value = if C::READS { 0 } else { of.number(value)? };
+        let residual = zigzag(of.wrap(value.wrapping_sub(near)));
+        let model = &mut self.places[axis][usize::from(length) & 15];
+        let (residual, symbol) = sized(c, model, self.shifts[axis], residual);
+        let number = of.wrap(near.wrapping_add(unzigzag(residual)));
+        Some((number, 1 + symbol.min(14) as u8, of.at(number)))
+    }
+
+    /// The code of a split, and its symbol.
+    #[inline(always)]
+    fn code<C: Coder>(&mut self, c: &mut C, code: SplitCode) -> Option<(usize, SplitCode)> {
         let known = if C::READS { 0 } else { self.codes.iter().position(|&x| x == code.0).unwrap_or(CODES) };
         let symbol = c.nibble(&mut self.code, known as u32) as usize;
         let code = match self.codes.get(symbol) {
@@ -464,7 +469,18 @@ impl Codec {
             None if symbol == CODES => c.plain(16, code.0.into()) as u16,
             None => return None,
         };
-        let code = SplitCode(code);
+        Some((symbol, SplitCode(code)))
+    }
+
+    /// The cuts of split `k`; `last` is the split of the chunk before at its vertex.
+    #[inline(always)]
+    fn references<C: Coder>(
+        &mut self,
+        c: &mut C,
+        (k, last): (u32, u32),
+        (symbol, code): (usize, SplitCode),
+        wanted: [u32; 2],
+    ) -> Option<[u32; 2]> {
         let own = self.base_faces.wrapping_add(2 * self.first);
         let kind = |cut: u32| match (cut >> 2).checked_sub(own) {
             _ if cut == NONE => NO_CUT,
@@ -486,7 +502,7 @@ impl Codec {
             NO_CUT => NONE,
             _ => self.face(c, (1, r, last), k, wanted[1] >> 2)? << 2 | b,
         };
-        (a < 3 && (b < 3 || r == NO_CUT)).then_some((code, [left, right]))
+        (a < 3 && (b < 3 || r == NO_CUT)).then_some([left, right])
     }
 }
 
