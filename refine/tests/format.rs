@@ -247,11 +247,13 @@ fn bytes_do_not_depend_on_the_number_of_threads() {
     }
 }
 
-/// Files of three meshes, a scene and all kinds of chunks; small enough to be damaged everywhere.
-fn victims() -> [Vec<u8>; 3] {
+/// Files of three meshes, or a terrain, a scene and all kinds of chunks; small enough to be damaged everywhere.
+fn victims() -> [Vec<u8>; 4] {
     let files = [(false, [180, 100, 120]), (true, [180, 100, 120]), (false, [60, 40, 60])];
-    [0, 1, 2].map(|k| {
-        let (sequential, [a, b, c]) = files[k];
+    [0, 1, 2, 3].map(|k| {
+        let Some(&(sequential, [a, b, c])) = files.get(k) else {
+            return include_bytes!("corpus/terrain.pm").to_vec();
+        };
         let meshes = vec![sample("scan", a, 1), sample("polygons", b, 1), sample("cad", c, 1)];
         let mut all = build_all(meshes, &[1.0; 3], &Options::default(), &Quiet).unwrap();
         let paged = k == 2;
@@ -285,6 +287,7 @@ fn victims_hold_every_kind_of_chunk() {
         ChunkType::BASE,
         ChunkType::SPLITS,
         ChunkType::SEQUEL,
+        ChunkType::DIRECT,
         ChunkType::ORDER,
         ChunkType::PAGE,
         ChunkType::SCENE,
@@ -323,8 +326,7 @@ fn cut_off(bytes: &[u8]) {
                 };
                 assert_eq!(index as usize, there, "{end}");
                 let splits = |m: u32| {
-                    let of =
-                        |c: &&Chunk| [ChunkType::SPLITS, ChunkType::SEQUEL].contains(&c.kind) && c.mesh == m;
+                    let of = |c: &&Chunk| c.kind.is_splits() && c.mesh == m;
                     directory.chunks[..there].iter().filter(of).map(|c| c.count as usize).sum::<usize>()
                 };
                 for (m, pm) in d.meshes.iter().enumerate() {
@@ -476,7 +478,7 @@ fn change_places(bytes: &[u8]) {
         let Err(FormatError::Chunk { index, kind: named, .. }) = decode(&bad) else { panic!("{k}: {kind}") };
         assert_eq!((index as usize, named), (k + 1, kind));
         is_a_part(&decode_prefix(&bad).unwrap());
-        let spare = ![ChunkType::BASE, ChunkType::SPLITS, ChunkType::SEQUEL].contains(&kind);
+        let spare = kind != ChunkType::BASE && !kind.is_splits();
         let mut less = all.clone();
         less.remove(k);
         if let Ok(d) = decode(&build(&less)) {

@@ -49,7 +49,7 @@ fn contradiction() -> BuildError {
 impl Blocks<'_> {
     /// Writes the splits of all blocks, as chunks that are read alone, into the store: each level after the one above it in the file, and its blocks quarter by quarter. The same bytes for any number of threads.
     ///
-    /// O(splits log splits). Memory: for each thread what is above a block on the way to the root, some 150 B a split.
+    /// O(splits log splits). Memory: for each thread what is above a block on the way to the root, some 80 B a split.
     ///
     /// # Errors
     /// [`BuildError`].
@@ -82,7 +82,7 @@ impl Blocks<'_> {
         Ok(Coded { blocks: self, tree, extent, next, written })
     }
 
-    /// What is coded against, and the corners of the box.
+    /// What all parts have in common, and the corners of the box.
     fn tree(&self) -> Result<(Tree, (DVec3, DVec3)), BuildError> {
         // The corners of the box, and a sample of places.
         let levels = self.figures().levels;

@@ -1,7 +1,7 @@
 //! Chunks of splits by direct references: read alone, with nothing done that is not the chunk's own.
 //!
 //! A terrain's chunks are there to be read while a view waits for them. Most of the time that `SPLT` takes goes into doing splits, those of the chunk and nearly as many of its context, to count
-//! edges in their rings. Here a split says in which turn it comes, and which splits made the faces that its cuts name: more bytes for connectivity than by ranks, none for contexts, and a fourth of the time.
+//! edges in their rings. Here a split says in which turn it comes, and which splits made the faces that its cuts name: more bytes for connectivity than by ranks, none for contexts, and less than half of the time.
 //! FORMAT.md, "SPLD", has the rules.
 
 mod axis;
@@ -14,7 +14,7 @@ use super::coder::{
 use super::places;
 use super::splits::{CONNECTIVITY, ERROR_SHIFT, ERRORS, MOST_LEVEL, PLACES, SplitBlock};
 use crate::aif::NONE;
-use crate::progressive::SplitCode;
+use crate::progressive::{SplitCode, SplitKind};
 use rustc_hash::FxHashMap;
 
 /// Kinds of streams: those of other chunks of splits, without attributes and faces.
@@ -105,6 +105,12 @@ fn shift_for(most: u64) -> u32 {
     (64 - most.leading_zeros()).saturating_sub(15)
 }
 
+/// The split makes one wedge and neither moves nor changes anything: other splits are not for these chunks.
+#[inline(always)]
+fn is_plain(code: SplitCode) -> bool {
+    code.kind() == SplitKind::Plain && !code.moves() && !code.changes_rows()
+}
+
 /// Codes one chunk.
 struct Codec {
     base_vertices: u32,
@@ -190,8 +196,7 @@ impl Codec {
     fn roots<C: Coder>(&mut self, c: &mut C, plan: Option<&Plan<'_>>, count: u32) -> Option<()> {
         let roots = plan.map_or(&[][..], |p| &p.roots);
         let before = self.base_vertices + self.first;
-        let mut gap = Number::default();
-        let number = c.number(&mut gap, roots.len() as u64);
+        let number = c.number(&mut Number::default(), roots.len() as u64);
         if number > u64::from(count) || number > u64::from(before) {
             return None;
         }
@@ -469,7 +474,7 @@ impl Codec {
             None if symbol == CODES => c.plain(16, code.0.into()) as u16,
             None => return None,
         };
-        Some((symbol, SplitCode(code)))
+        Some((symbol, SplitCode(code))).filter(|c| is_plain(c.1))
     }
 
     /// The cuts of split `k`; `last` is the split of the chunk before at its vertex.
@@ -628,9 +633,10 @@ pub(super) fn write(
 
 /// Bytes that reading a chunk of so many splits takes at most on the way, besides the arrays that come of it.
 pub(crate) fn scratch(count: u32) -> u64 {
-    // Twice as many vertices as splits; turns, faces from before and faces made, the first two grow.
+    // Twice as many vertices as splits; turns, which grow, faces from before, and faces made.
     let each = 2 * size_of::<Local>() + 3 * 8 + 2 * 8 + 4;
-    each as u64 * u64::from(count) + size_of::<Codec>() as u64
+    // Codes, and few turns.
+    each as u64 * u64::from(count) + size_of::<Codec>() as u64 + 256
 }
 
 /// Bytes of each stream.
@@ -850,7 +856,7 @@ mod tests {
         fn damage_is_none_or_something_else(of in given(), cut in any::<prop::sample::Index>(), bit in any::<prop::sample::Index>()) {
             let (head, rows, want) = rows(&of, false, places_by(0, false));
             let bytes = written(&head, &rows, [1.0; 3]).unwrap();
-            again(&head, &want, &bytes[..cut.index(bytes.len())]);
+            prop_assert_eq!(again(&head, &want, &bytes[..cut.index(bytes.len())]), None);
             let mut other = bytes.clone();
             other[bit.index(8 * bytes.len()) / 8] ^= 1 << (bit.index(8 * bytes.len()) % 8);
             if let Some(block) = again(&head, &want, &other) {
@@ -861,6 +867,7 @@ mod tests {
                     prop_assert!(s.left[k] >> 2 < face && s.left[k] & 3 < 3);
                     prop_assert!(s.right[k] == NONE || s.right[k] >> 2 < face && s.right[k] & 3 < 3);
                     prop_assert_eq!(s.right[k] != NONE, s.code[k].two_faces());
+                    prop_assert!(is_plain(s.code[k]));
                     face += 1 + u32::from(s.code[k].two_faces());
                 }
                 prop_assert_eq!(s.len(), want.splits.len());
@@ -879,6 +886,26 @@ mod tests {
         rows.vertex.reverse();
         rows.cuts[0][0] = (BASE.1 + 2) << 2;
         assert!(written(&head, &rows, [1.0; 3]).is_none());
+    }
+
+    #[test]
+    fn splits_that_do_more_are_neither_written_nor_read() {
+        let split = (0.0, [0.0; 2], 0, false, 5, [0; 3]);
+        let (head, mut rows, want) = rows(&(vec![], vec![split]), false, places_by(0, false));
+        let plain = rows.code[0];
+        let mut bytes = written(&head, &rows, [1.0; 3]).unwrap();
+        for more in [SplitCode::MOVES, SplitCode::ROWS, 1 << SplitCode::KIND, 2 << SplitCode::KIND] {
+            rows.code[0] = SplitCode(plain.0 | more);
+            assert!(written(&head, &rows, [1.0; 3]).is_none());
+        }
+        assert!(again(&head, &want, &bytes).is_some());
+        // The plain bits of the stream of connectivity, its last, begin with how many codes there are and the first.
+        let start = 27 + 1;
+        let words = usize::from(bytes[start]);
+        let at = start + 1 + words;
+        assert_eq!(u16::from_le_bytes([bytes[at], bytes[at + 1]]) >> 4, plain.0 & 0xFFF);
+        bytes[at + 2] ^= (SplitCode::MOVES >> 12) as u8;
+        assert!(again(&head, &want, &bytes).is_none());
     }
 
     #[test]

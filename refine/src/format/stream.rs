@@ -35,7 +35,7 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// A mesh of this base, without attributes, and of so many splits; `like` are places such as theirs, by which they are coded. Bounds are about the middle of the box around the finest mesh's
+    /// A mesh of this base, without attributes, and of so many splits; `like` are places such as theirs, by which those of the base are coded ([`Tree::with_steps`] is for those of splits). Bounds are about the middle of the box around the finest mesh's
     /// vertices, whose diagonal is known too. `None` if the base refers to what is not there, or has attributes.
     pub fn new(
         base: ProgressiveMesh,

@@ -85,7 +85,7 @@ impl Axis {
         match self.kind {
             Kind::Steps => {
                 let k = round_even(x / self.step);
-                Some(k as i64).filter(|k| k.abs() < 1 << 31 && is(k))
+                Some(k as i64).filter(|k| k.unsigned_abs() < 1 << 31 && is(k))
             }
             Kind::Floats => {
                 let near = (x / self.step) as f32;
@@ -102,6 +102,29 @@ impl Axis {
         match self.kind {
             Kind::Doubles => k,
             Kind::Steps | Kind::Floats => i64::from(k as i32),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_return_whatever_they_are() {
+        let hard = [
+            0.0, -0.0, 1.5, -1e19, -9_223_372_036_854_775_808.0, 9e18, f64::from(f32::MIN), f64::MIN, f64::INFINITY,
+            f64::NEG_INFINITY, f64::NAN, 1e-320, f64::from(i32::MIN), f64::from(i32::MAX), 0.1,
+        ];
+        for double in [false, true] {
+            let round = |x: f64| if double { x } else { f64::from(x as f32) };
+            for step in [1.0, 0.1, 1e-320, 1e300] {
+                for &x in &hard {
+                    let axis = Axis::of([round(x)].into_iter(), step, double);
+                    let k = axis.number(round(x)).unwrap();
+                    assert_eq!(axis.at(axis.wrap(k)).to_bits(), round(x).to_bits(), "{x} {axis:?}");
+                }
+            }
         }
     }
 }

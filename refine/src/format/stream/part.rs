@@ -79,7 +79,7 @@ pub(super) struct Open {
 impl Path<'_> {
     /// Adds a part below the one on top, whose splits are those from `file` on, and codes them. `None` if its arrays contradict each other.
     ///
-    /// O(n log n) for the part, and the splits of the path that its chunks repeat.
+    /// O(n log n) for the part.
     pub fn push(&mut self, given: &PathSplits, file: u32) -> Option<Renumbered> {
         let s = &given.splits;
         let m = s.vertex.len();
