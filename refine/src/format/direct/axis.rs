@@ -113,8 +113,21 @@ mod tests {
     #[test]
     fn numbers_return_whatever_they_are() {
         let hard = [
-            0.0, -0.0, 1.5, -1e19, -9_223_372_036_854_775_808.0, 9e18, f64::from(f32::MIN), f64::MIN, f64::INFINITY,
-            f64::NEG_INFINITY, f64::NAN, 1e-320, f64::from(i32::MIN), f64::from(i32::MAX), 0.1,
+            0.0,
+            -0.0,
+            1.5,
+            -1e19,
+            -9_223_372_036_854_775_808.0,
+            9e18,
+            f64::from(f32::MIN),
+            f64::MIN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NAN,
+            1e-320,
+            f64::from(i32::MIN),
+            f64::from(i32::MAX),
+            0.1,
         ];
         for double in [false, true] {
             let round = |x: f64| if double { x } else { f64::from(x as f32) };

@@ -23,6 +23,10 @@ pub(super) struct Order {
     pub(super) on: Vec<[u32; 3]>,
     /// The next split of its vertex, and the first of the vertex it makes.
     next: Vec<[u32; 2]>,
+    /// By which those near each other in space come together.
+    key: Vec<u64>,
+    /// The vertices from before that are split in each chunk, in their order.
+    pub(super) roots: Vec<Vec<u32>>,
     /// The chunk of each, once it is in one.
     chunk: Vec<u32>,
     /// The place of each in the order, once it has one.
@@ -99,6 +103,7 @@ impl Path<'_> {
             .zip(0..)
             .map(|(&v, t)| (u64::from(curve.at(place(v).to_array())) << 32 | u64::from(v), t))
             .collect();
+        order.key = keys.iter().map(|k| k.0).collect();
         keys.sort_unstable();
         let is_top = tops(&part.splits.error, &order.on, first);
         let (top, others): (Vec<_>, Vec<_>) = keys.iter().partition(|k| is_top[k.1 as usize]);
@@ -171,14 +176,14 @@ impl Path<'_> {
                 // Until it has one.
                 order.slot[t as usize] = chosen.len() as u32;
                 if own(on[0]).is_none_or(|k| order.chunk[k as usize] != number) {
-                    roots.push((vertex(order, t), chosen.len() as u32));
+                    roots.push((order.key[t as usize], vertex(order, t), chosen.len() as u32));
                 }
                 chosen.push(t);
             }
             !can
         });
         roots.sort_unstable();
-        let roots: Vec<u32> = roots.into_iter().map(|r| r.1).collect();
+        let (of_roots, roots): (Vec<u32>, Vec<u32>) = roots.into_iter().map(|(_, v, t)| (v, t)).unzip();
         let here = |k: u32| match order.chunk.get(k as usize) {
             Some(&chunk) if chunk == number => order.slot[k as usize],
             _ => NONE,
@@ -193,6 +198,9 @@ impl Path<'_> {
             order.slot[t as usize] = slot;
             order.order.push(t);
             self.grow(v, (first + slot, file + slot), known, open);
+        }
+        if !of_roots.is_empty() {
+            order.roots.push(of_roots);
         }
         candidates
     }

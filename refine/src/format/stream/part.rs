@@ -6,6 +6,7 @@ use super::super::pages;
 use super::super::places;
 use super::super::splits::{error_level, rounded_error, without_arrangement};
 use super::super::write::{Part, bounds_beside, part};
+use super::order::Order;
 use super::{NO_BOUNDS, Next, Path, Vertex};
 use crate::aif::{NONE, Positions};
 use crate::hierarchy::{Bounds, Cone, Packed, pack_up};
@@ -159,13 +160,13 @@ impl Path<'_> {
         self.head.splits = self.splits();
         self.names.push([open.splits as u32, file]);
         debug_assert_eq!(self.vertices.len(), (n0 + self.splits()) as usize);
-        self.code(&mut open, &order.counts)?;
+        self.code(&mut open, &order)?;
         self.parts.push(open);
         Some(numbers)
     }
 
     /// The splits of a chunk as they are in the file.
-    fn rows(&self, range: std::ops::Range<usize>) -> Rows {
+    fn rows(&self, range: std::ops::Range<usize>, roots: &[u32]) -> Rows {
         let s = &self.mesh.splits;
         let cut = |c: u32| match self.head.maker(c >> 2) {
             Some((i, second)) if c != NONE => {
@@ -175,6 +176,7 @@ impl Path<'_> {
         };
         Rows {
             first: self.name(range.start as u32),
+            roots: roots.iter().map(|&v| self.vertex_name(v)).collect(),
             vertex: s.vertex[range.clone()].iter().map(|&v| self.vertex_name(v)).collect(),
             cuts: range.clone().map(|k| [cut(s.left[k]), cut(s.right[k])]).collect(),
             code: s.code[range.clone()].to_vec(),
@@ -184,12 +186,12 @@ impl Path<'_> {
     }
 
     /// Codes the chunks of the part that was just added.
-    fn code(&mut self, open: &mut Open, counts: &[usize]) -> Option<()> {
+    fn code(&mut self, open: &mut Open, order: &Order) -> Option<()> {
         let (mut streams, mut room) = Default::default();
         let point = if self.head.double { 24 } else { 12 };
         let mut at = open.splits;
-        for &count in counts {
-            let rows = self.rows(at..at + count);
+        for (&count, roots) in order.counts.iter().zip(&order.roots) {
+            let rows = self.rows(at..at + count, roots);
             let bytes = direct::write(&self.head, &rows, self.tree.steps, (&mut streams, &mut room))?;
             let mut splits = part(ChunkType::DIRECT, true, 0, (18 + point) * count as u64, bytes);
             let chunk = &mut splits.chunk;
