@@ -133,7 +133,7 @@ struct Codec {
     outside: Vec<[u32; 2]>,
     /// The last of them that was named.
     named: i64,
-    /// The first face of every split of the chunk.
+    /// Twice the first face of every split of the chunk, and 1 more if it makes two.
     made: Vec<u32>,
     // What is learned.
     wait: [Nibble; 3],
