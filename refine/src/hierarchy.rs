@@ -27,7 +27,7 @@ mod spheres;
 mod tree;
 
 pub use bounds::{Bounds, Guarantee, SplitBounds};
-pub(crate) use bounds::{Packed, pack_up, unpack};
+pub(crate) use bounds::{Packed, pack_up, repack, unpack};
 pub(crate) use cone::Cone;
 pub(crate) use directions::{CHANGE, DEPTH, Direction};
 pub(crate) use forest::Forest;

@@ -90,7 +90,7 @@ pub enum PagedError {
 
 /// A mesh of a file between base and full detail, finer where a view needs it, whose parts are read when they are needed.
 ///
-/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 85 B for a split of a resident page by the ring rule, 70 by that of cuts, and 271 B for a vertex shown, up to twice as many while a part of what is free suffices for that, up to an eighth more where it does not.
+/// `S` is where the bytes come from. Memory: [`PagedView::bytes`]; about 85 B for a split of a resident page by the ring rule, 70 by that of cuts, and 247 B for a vertex shown, up to twice as many while a part of what is free suffices for that, up to an eighth more where it does not.
 #[derive(Debug)]
 pub struct PagedView<S> {
     shelf: Shelf<S>,
@@ -510,7 +510,7 @@ impl<S: ByteRanges> PagedView<S> {
     /// A node is in the mesh now, in this place of the list: what replaces it, if anything, can be applied.
     fn offer(&mut self, place: u32, (next, bounds): (u32, Packed), centre: Vec3) {
         if next != NONE {
-            self.open.put(place, Entry::new(next, centre, bounds));
+            self.open.put(place, &Entry::new(next, centre, bounds));
         }
     }
 

@@ -296,7 +296,7 @@ fn room_made_ahead_is_used_and_given_back() {
     let (before, each) = (other.bytes(), room / (2 * shown));
     let freed = other.trim();
     assert_eq!(other.bytes(), before - freed);
-    assert!(other.shown_bytes() < room * 9 / 16 + (1 << 14) && other.shown_bytes() > each * shown);
+    assert!(other.shown_bytes() < room * 9 / 16 + (1 << 15) && other.shown_bytes() > each * shown);
     assert!(adapt(&mut other, 0.2, 2.5).done.complete);
     assert_same(&other.to_input(), &view.to_input());
     // Where nothing is free pages take its place, if they must.

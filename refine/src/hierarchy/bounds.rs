@@ -96,6 +96,12 @@ pub(crate) fn unpack(code: u16) -> f32 {
     f32::from_bits((code as u32) << 15)
 }
 
+/// What was unpacked.
+#[inline]
+pub(crate) fn repack(x: f32) -> u16 {
+    (x.to_bits() >> 15) as u16
+}
+
 impl Bounds {
     /// Measures the bounds of a progressive mesh; see the [module](super) for what that gives. The same for every number of threads.
     ///

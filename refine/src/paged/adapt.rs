@@ -240,7 +240,7 @@ impl<S: ByteRanges> PagedView<S> {
         while let Some((place, mark)) = self.open.marked(k) {
             k += 1;
             // What it would replace may have been undone.
-            let Some(&e) = self.open.get(place) else { continue };
+            let Some(e) = self.open.get(place) else { continue };
             match mark {
                 Mark::Now => self.enqueue(0, e.split, frame),
                 Mark::Later => {
@@ -352,7 +352,7 @@ impl<S: ByteRanges> PagedView<S> {
         desk.clear();
         for &h in &freed[part..] {
             if let Some(e) = self.last.get(h) {
-                desk.put(h, e);
+                desk.put(h, &e);
             }
         }
         freed.truncate(part);
@@ -384,7 +384,7 @@ impl<S: ByteRanges> PagedView<S> {
         let from = at.saturating_sub(LOT);
         for k in (from..at).rev() {
             if let Some((place, entry)) = list.ready(k) {
-                desk.put(place, entry);
+                desk.put(place, &entry);
             }
         }
         frame.meter.looks += desk.places.len();
@@ -491,7 +491,7 @@ impl<S: ByteRanges> PagedView<S> {
                 let first = self.shelf.first_open(h);
                 for place in [first, first + 1] {
                     if let Some(e) = self.open.get(place) {
-                        desk.put(place, e);
+                        desk.put(place, &e);
                     }
                 }
             }
@@ -499,7 +499,7 @@ impl<S: ByteRanges> PagedView<S> {
             desk.clear();
             for &h in part {
                 if let Some(e) = self.last.get(h) {
-                    desk.put(h, e);
+                    desk.put(h, &e);
                 }
             }
             self.clock.look(&desk.last, &desk.entries, &mut desk.looked);
@@ -654,7 +654,7 @@ impl<S: ByteRanges> PagedView<S> {
         self.can_count(i, needs, LED, |r| r.dependents)?;
         // It says itself what it replaces, and what it replaces says by what.
         let place = self.shelf.open_place_of(needs[0], r.parent);
-        let entry = *self.open.get(place).filter(|e| e.split == i).ok_or_else(lost)?;
+        let entry = self.open.get(place).filter(|e| e.split == i).ok_or_else(lost)?;
         let (h, more) = self.shelf.come(i, at, needs).ok_or_else(lost)?;
         if more {
             self.extend();
@@ -667,7 +667,7 @@ impl<S: ByteRanges> PagedView<S> {
         }
         self.lead(h, needs, true, |_| ());
         self.open.take_out(place);
-        self.last.put(h, entry);
+        self.last.put(h, &entry);
         let old = self.shelf.head.base_vertices + 2 * i;
         let centre = if self.shelf.moves { self.shelf.local_centre(old)? } else { entry.centre() };
         let first = self.shelf.first_open(h);

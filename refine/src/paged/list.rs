@@ -5,10 +5,38 @@
 use super::both;
 use super::calendar::Calendar;
 use super::ready::LOT;
+use crate::aif::NONE;
+use crate::hierarchy::{Cone, Packed};
 use crate::selective::{Clocks, Due, Entry, Looked, Many, Sums};
+use glam::Vec3;
+
+/// An entry, packed, and when to look at it, half a line of memory: whoever asks for the one soon asks for the other.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+struct Place {
+    centre: Vec3,
+    bounds: Packed,
+    split: u32,
+    /// What is not there is never due.
+    due: Due,
+}
+
+impl Place {
+    const EMPTY: Place = Place {
+        centre: Vec3::ZERO,
+        bounds: Packed { error: 0, radius: 0, cone: Cone(0) },
+        split: NONE,
+        due: Due::NEVER,
+    };
+
+    #[inline]
+    fn entry(&self) -> Entry {
+        Entry::new(self.split, self.centre, self.bounds)
+    }
+}
 
 /// Bytes of a place, and of an entry that is there, at most.
-pub(super) const PLACE: usize = size_of::<Entry>() + size_of::<Due>() + 1;
+pub(super) const PLACE: usize = size_of::<Place>() + 1;
 pub(super) const THERE: usize = Calendar::EACH + size_of::<u32>();
 
 /// More bytes that an array of such a capacity takes with room for so many, and those of the old one while it is filled.
@@ -39,9 +67,7 @@ pub(super) const MANY: usize = 1024;
 /// A list without order, by places.
 #[derive(Debug, Default)]
 pub(super) struct List {
-    of: Vec<Entry>,
-    /// What is not there is never due.
-    due: Vec<Due>,
+    of: Vec<Place>,
     /// Places that are due within some frames.
     calendar: Calendar,
     /// Places that are due in this frame, ascending; some may have been taken out since.
@@ -55,12 +81,11 @@ pub(super) struct List {
 impl List {
     /// Places, and entries that can be there at once.
     pub(super) fn capacity(&self) -> [usize; 2] {
-        [self.of.capacity().min(self.due.capacity()), self.calendar.capacity().min(self.ready.capacity())]
+        [self.of.capacity(), self.calendar.capacity().min(self.ready.capacity())]
     }
 
     pub(super) fn bytes(&self) -> usize {
-        size_of::<Entry>() * self.of.capacity()
-            + size_of::<Due>() * self.due.capacity()
+        size_of::<Place>() * self.of.capacity()
             + self.calendar.bytes()
             + size_of::<u32>() * self.ready.capacity()
             + size_of::<u64>() * self.sorting.capacity()
@@ -72,7 +97,6 @@ impl List {
             v.reserve_exact(to.saturating_sub(v.len()));
         }
         grow(&mut self.of, places);
-        grow(&mut self.due, places);
         grow(&mut self.sorting, places.div_ceil(64));
         self.calendar.reserve_to(there);
         grow(&mut self.ready, there);
@@ -81,7 +105,6 @@ impl List {
     /// Gives room for more than so many back, unless it is in use; the calendar's is given back nevertheless: then all are asked.
     pub(super) fn shrink_to(&mut self, [places, there]: [usize; 2]) {
         self.of.shrink_to(places);
-        self.due.shrink_to(places);
         self.sorting.shrink_to(places.div_ceil(64));
         self.calendar.shrink_to(there);
         self.ready.shrink_to(there);
@@ -92,8 +115,7 @@ impl List {
         let sorting = self.sorting.capacity();
         let [told, sheets] = self.calendar.room(there);
         let all = [
-            grown::<Entry>(self.of.capacity(), places),
-            grown::<Due>(self.due.capacity(), places),
+            grown::<Place>(self.of.capacity(), places),
             grown::<u64>(sorting, places.div_ceil(64)),
             grown::<(u32, Due)>(told[0], told[1]),
             grown::<u32>(sheets[0], sheets[1]),
@@ -106,47 +128,52 @@ impl List {
     #[inline]
     pub(super) fn extend_to(&mut self, places: usize) {
         if self.of.len() < places {
-            self.of.resize(places, Entry::NOTHING);
-            self.due.resize(places, Due::NEVER);
+            self.of.resize(places, Place::EMPTY);
             self.sorting.resize(places.div_ceil(64), 0);
         }
     }
 
     /// When what is in a place is due.
     pub(super) fn due(&self, at: u32) -> Due {
-        self.due.get(at as usize).copied().unwrap_or(Due::NEVER)
+        self.of.get(at as usize).map_or(Due::NEVER, |p| p.due)
     }
 
     /// Something is in a place.
     #[inline]
     pub(super) fn has(&self, at: u32) -> bool {
-        self.due.get(at as usize).is_some_and(|&d| d != Due::NEVER)
+        self.of.get(at as usize).is_some_and(|p| p.due != Due::NEVER)
     }
 
     /// What is in a place.
     #[inline]
-    pub(super) fn get(&self, at: u32) -> Option<&Entry> {
-        self.of.get(at as usize).filter(|_| self.has(at))
+    pub(super) fn get(&self, at: u32) -> Option<Entry> {
+        self.of.get(at as usize).filter(|p| p.due != Due::NEVER).map(Place::entry)
     }
 
     /// What is in a place, or was there last.
     #[inline]
-    pub(super) fn last_at(&self, at: u32) -> Option<&Entry> {
-        self.of.get(at as usize)
+    pub(super) fn last_at(&self, at: u32) -> Option<Entry> {
+        self.of.get(at as usize).map(Place::entry)
+    }
+
+    /// Where the split of that stands in memory.
+    #[inline]
+    pub(super) fn split_at(&self, at: u32) -> Option<&u32> {
+        self.of.get(at as usize).map(|p| &p.split)
     }
 
     /// Puts an entry into a place. It is looked at in this frame: [`List::set_due`] is called for it, or [`List::begin`] told to ask all.
     #[inline]
-    pub(super) fn put(&mut self, at: u32, entry: Entry) {
-        if let (Some(e), Some(d)) = (self.of.get_mut(at as usize), self.due.get_mut(at as usize)) {
-            (*e, *d) = (entry, Due::NOW);
+    pub(super) fn put(&mut self, at: u32, entry: &Entry) {
+        if let Some(p) = self.of.get_mut(at as usize) {
+            *p = Place { centre: entry.centre(), bounds: entry.bounds(), split: entry.split, due: Due::NOW };
         }
     }
 
     /// What is in a place, or was taken out of it, is there and dealt with in this frame, as what is put there is.
     #[inline]
     pub(super) fn hold(&mut self, at: u32) {
-        self.due.get_mut(at as usize).into_iter().for_each(|d| *d = Due::NOW);
+        self.note(at, Due::NOW);
     }
 
     /// What was taken out of a place is there again, and to be looked at at once.
@@ -158,15 +185,20 @@ impl List {
     /// Takes out what is in a place.
     #[inline]
     pub(super) fn take_out(&mut self, at: u32) {
-        if let Some(d) = self.due.get_mut(at as usize) {
-            *d = Due::NEVER;
+        self.note(at, Due::NEVER);
+    }
+
+    #[inline]
+    fn note(&mut self, at: u32, due: Due) {
+        if let Some(p) = self.of.get_mut(at as usize) {
+            p.due = due;
         }
     }
 
     #[inline]
     pub(super) fn set_due(&mut self, at: u32, due: Due) {
-        let Some(d) = self.due.get_mut(at as usize) else { return };
-        *d = due;
+        let Some(p) = self.of.get_mut(at as usize) else { return };
+        p.due = due;
         self.calendar.tell(at, due);
     }
 
@@ -176,7 +208,7 @@ impl List {
         self.ready.clear();
         if all {
             self.calendar.forget();
-            let there = (0..).zip(&self.due).filter(|(_, d)| **d != Due::NEVER).map(|(at, _)| at);
+            let there = (0..).zip(&self.of).filter(|(_, p)| p.due != Due::NEVER).map(|(at, _)| at);
             self.ready.extend(there);
         } else if self.calendar.includes(now) {
             self.ask_calendar(now);
@@ -191,9 +223,9 @@ impl List {
     fn ask_all(&mut self, now: Sums, clock: &Clocks) {
         let end = self.calendar.begin(clock);
         let mut first = 0;
-        for block in self.due.chunks(16) {
-            if block.iter().fold(false, |any, &d| any | end.have_reached(d)) {
-                for (at, &d) in (first..).zip(block) {
+        for block in self.of.chunks(16) {
+            if block.iter().fold(false, |any, p| any | end.have_reached(p.due)) {
+                for (at, d) in (first..).zip(block.iter().map(|p| p.due)) {
                     if now.have_reached(d) {
                         self.ready.push(at);
                     } else if end.have_reached(d) {
@@ -207,8 +239,8 @@ impl List {
 
     fn ask_calendar(&mut self, now: Sums) {
         // Each once, though it was put there, or told, more than once since.
-        let (due, sorting) = (&self.due, &mut self.sorting);
-        let is = |at: u32| due.get(at as usize).copied().unwrap_or(Due::NEVER);
+        let (of, sorting) = (&self.of, &mut self.sorting);
+        let is = |at: u32| of.get(at as usize).map_or(Due::NEVER, |p| p.due);
         self.calendar.ask(now, is, |at| sorting[at as usize / 64] |= 1 << (at % 64));
         let ready = &mut self.ready;
         for (word, first) in self.sorting.iter_mut().zip((0u32..).step_by(64)).filter(|(w, _)| **w != 0) {
@@ -241,11 +273,11 @@ impl List {
             for (k, &(wanted, due)) in (from..to).zip(&*told) {
                 let at = self.ready[k];
                 let Some(e) = self.get(at) else { continue };
-                let (mark, due) = sort(e, wanted, due);
+                let (mark, due) = sort(&e, wanted, due);
                 match mark {
                     Some(Mark::Now) => self.hold(at),
                     // It is told when its page has been wished for.
-                    Some(Mark::Later) => self.due[at as usize] = due,
+                    Some(Mark::Later) => self.note(at, due),
                     None => self.set_due(at, due),
                 }
                 if let Some(mark) = mark {
@@ -263,7 +295,7 @@ impl List {
         let (mut looked, mut entries) = (Looked::default(), Vec::with_capacity(LOT));
         for (places, told) in places.chunks(LOT).zip(told.chunks_mut(LOT)) {
             entries.clear();
-            entries.extend(places.iter().map(|&at| self.of[at as usize]));
+            entries.extend(places.iter().map(|&at| self.of[at as usize].entry()));
             clock.look(many, &entries, &mut looked);
             told.iter_mut().zip(looked.each()).for_each(|(t, l)| *t = l);
         }
@@ -282,7 +314,7 @@ impl List {
 
     /// Place `k` of those that are due, and what is there; `None` if it was taken out.
     #[inline]
-    pub(super) fn ready(&self, k: usize) -> Option<(u32, &Entry)> {
+    pub(super) fn ready(&self, k: usize) -> Option<(u32, Entry)> {
         let at = *self.ready.get(k)?;
         self.get(at).map(|e| (at, e))
     }
@@ -291,7 +323,7 @@ impl List {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hierarchy::{Packed, pack_up};
+    use crate::hierarchy::pack_up;
     use crate::selective::{Cull, Judges, Lens};
     use crate::view::Camera;
     use glam::{DMat4, DVec3};
@@ -323,7 +355,7 @@ mod tests {
                 clock.go_on(&Judges::new(&lens, 1.0))
             };
             step(&mut clock, 0.0);
-            (0..places as u32).for_each(|at| list.put(at, entry(at, DVec3::ZERO)));
+            (0..places as u32).for_each(|at| list.put(at, &entry(at, DVec3::ZERO)));
             assert_eq!(list.begin(true, &clock), places);
             assert!(step(&mut clock, 1.0));
             (0..places as u32).for_each(|at| list.take_out(at));
@@ -396,7 +428,7 @@ mod tests {
             }
             all_found += found.len();
             let was_known = list.calendar.includes(clock.sums());
-            let asked: Vec<Entry> = found.iter().map(|&p| *list.get(p).unwrap()).collect();
+            let asked: Vec<Entry> = found.iter().map(|&p| list.get(p).unwrap()).collect();
             let mut looked = Looked::default();
             clock.look(&clock.next(&judges), &asked, &mut looked);
             for (&place, (_, due)) in found.iter().zip(looked.each()) {
@@ -419,7 +451,7 @@ mod tests {
                 if splits % 3 == 1 {
                     list.put_back(place);
                 } else {
-                    list.put(place, entry(splits, vector()));
+                    list.put(place, &entry(splits, vector()));
                     list.set_due(place, Due::NOW);
                     assert_eq!(list.get(place).map(|e| e.split), Some(splits));
                 }
@@ -445,7 +477,7 @@ mod tests {
                 list.extend_to(count);
                 for at in 0..count as u32 {
                     let k = f64::from(at);
-                    list.put(at, entry(at, DVec3::new((k * 0.618).fract(), (k * 0.414).fract(), 0.0) - 0.5));
+                    list.put(at, &entry(at, DVec3::new((k * 0.618).fract(), (k * 0.414).fract(), 0.0) - 0.5));
                 }
                 (0..count as u32).step_by(5).for_each(|at| list.take_out(at));
                 let many = clock.next(&judges);
@@ -462,7 +494,7 @@ mod tests {
                 let mut marked = (0..).map_while(|k| list.marked(k));
                 for at in (0..count as u32).filter(|at| at % 5 != 0 && at % 35 != 1) {
                     let mut looked = Looked::default();
-                    clock.look(&many, &[list.of[at as usize]], &mut looked);
+                    clock.look(&many, &[list.of[at as usize].entry()], &mut looked);
                     let (wanted, due) = looked.each().next().unwrap();
                     let even = at % 2 == 0;
                     assert_eq!(list.due(at), if wanted && even { Due::NOW } else { due });

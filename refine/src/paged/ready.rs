@@ -95,7 +95,7 @@ impl<S: ByteRanges> PagedView<S> {
                 needs.filter(|&d| d != NONE && shelf.hot(d) == NONE).for_each(&mut tell);
             }
             let place = shelf.open_place_of(at.needs[0], r.parent);
-            self.open.last_at(place).iter().for_each(|e| reads.ask(&e.split));
+            self.open.split_at(place).into_iter().for_each(|s| reads.ask(s));
             *at_hand = Some(at);
             if by_strokes {
                 continue;

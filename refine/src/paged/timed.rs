@@ -205,7 +205,7 @@ impl<S: ByteRanges> Cut for PagedView<S> {
     fn entry(&self, i: u32) -> Entry {
         // It was put there when the split was asked for.
         let entry = self.last.last_at(self.shelf.hot(i)).filter(|e| e.split == i);
-        entry.copied().unwrap_or(Entry::NOTHING)
+        entry.unwrap_or(Entry::NOTHING)
     }
 
     fn place(&self, node: u32, _: u32) -> DVec3 {

@@ -1,7 +1,7 @@
 //! A split with what is needed to decide about it.
 
 use crate::aif::NONE;
-use crate::hierarchy::{Cone, Direction, Hierarchy, Packed, unpack};
+use crate::hierarchy::{Cone, Direction, Hierarchy, Packed, repack, unpack};
 use glam::Vec3;
 
 /// A split and its bounds, ready to be decided about, 32 B.
@@ -41,6 +41,12 @@ impl Entry {
     pub(crate) fn new(split: u32, centre: Vec3, b: Packed) -> Entry {
         let direction = Direction::ANY;
         Entry { centre, radius: unpack(b.radius), error: unpack(b.error), split, cone: b.cone, direction }
+    }
+
+    /// Its bounds, as they were given.
+    #[inline]
+    pub(crate) fn bounds(&self) -> Packed {
+        Packed { error: repack(self.error), radius: repack(self.radius), cone: self.cone }
     }
 
     /// Where it stands, about the origin of the bounds.
