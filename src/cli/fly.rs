@@ -187,7 +187,7 @@ impl Args {
 
     /// That the path is where the scene is.
     fn something_seen(&self, frames: &[Frame], bounds: Option<(DVec3, DVec3)>) -> Result<(), Failure> {
-        if frames.iter().any(|f| f.visible_vertices > 0) {
+        if frames.iter().any(|f| f.visible_vertices.is_some_and(|n| n > 0)) {
             return Ok(());
         }
         let (lo, hi) = bounds.unwrap_or_default();
@@ -242,7 +242,7 @@ impl Args {
                 faces: step.scene.face_count(),
                 vertices: step.scene.vertex_count(),
                 morphing: step.scene.morphing(),
-                visible_vertices: step.scene.visible_vertices(step.camera),
+                visible_vertices: measuring.visible(step.number, || step.scene.visible_vertices(step.camera)),
                 dirty_index_bytes: step.changes.iter().map(|c| c.index_bytes()).sum(),
                 dirty_wedges: step.changes.iter().map(|c| c.wedges.len()).sum(),
                 strips: self.strips.then(|| {

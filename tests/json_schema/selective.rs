@@ -144,7 +144,8 @@ struct FlyFrame {
     tau: Option<f64>,
     complete: bool,
     morphing: usize,
-    visible_vertices: usize,
+    #[serde(deserialize_with = "present")]
+    visible_vertices: Option<usize>,
     dirty_index_bytes: usize,
     dirty_wedges: usize,
     #[serde(deserialize_with = "present")]

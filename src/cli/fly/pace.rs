@@ -123,7 +123,13 @@ pub(super) struct Measuring<'a> {
     /// How far full detail may be off the ground.
     floor: f64,
     file: &'a str,
+    /// Some frame has seen something.
+    seen: Cell<bool>,
 }
+
+/// Of so many frames one has the vertices in its picture counted, where no others are measured. Counting reads much memory, and what the next frame needs has to be fetched again then: over generated terrain of
+/// 4,097 x 4,097, with every frame counted, frames took 7 to 50 % longer.
+const COUNTED: usize = 20;
 
 impl<'a> Measuring<'a> {
     /// By the judge that is made if need be; over terrain by the samples of its grid.
@@ -136,7 +142,24 @@ impl<'a> Measuring<'a> {
         judge: impl FnOnce() -> Result<Judge, Failure>,
     ) -> Result<Self, Failure> {
         let judge = every.filter(|_| course.ground.is_none()).map(|_| judge()).transpose()?;
-        Ok(Measuring { every, judge, ground: course.ground.as_ref(), floor: course.floor, file })
+        Ok(Measuring {
+            every,
+            judge,
+            ground: course.ground.as_ref(),
+            floor: course.floor,
+            file,
+            seen: Cell::new(false),
+        })
+    }
+
+    /// Has the vertices that frame `number` sees counted, if it is its turn, or if none has seen anything yet.
+    pub(super) fn visible(&self, number: usize, count: impl FnOnce() -> usize) -> Option<usize> {
+        let due = number.is_multiple_of(self.every.unwrap_or(COUNTED)) || !self.seen.get();
+        due.then(|| {
+            let visible = count();
+            self.seen.set(self.seen.get() || visible > 0);
+            visible
+        })
     }
 
     /// Measures frame `number`, if it is its turn; over terrain cracks are looked for in every frame. `triangles` is asked for what is shown then.

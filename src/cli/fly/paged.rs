@@ -116,7 +116,7 @@ impl Args {
                 faces: scene.face_count(),
                 vertices: scene.vertex_count(),
                 morphing: scene.morphing(),
-                visible_vertices: scene.visible_vertices(camera),
+                visible_vertices: measuring.visible(number, || scene.visible_vertices(camera)),
                 dirty_index_bytes: changes.iter().map(PagedChanges::index_bytes).sum(),
                 dirty_wedges: changes.iter().map(|c| c.wedges).sum(),
                 strips: self.strips.then(|| StripReport::of(scene.views().iter().map(|v| v.strips()))),

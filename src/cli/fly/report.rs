@@ -51,7 +51,7 @@ pub(super) struct Frame {
     pub(super) tau: Option<f64>,
     pub(super) complete: bool,
     pub(super) morphing: usize,
-    pub(super) visible_vertices: usize,
+    pub(super) visible_vertices: Option<usize>,
     pub(super) dirty_index_bytes: usize,
     pub(super) dirty_wedges: usize,
     pub(super) strips: Option<StripReport>,

@@ -49,7 +49,7 @@ impl Args {
             frames.push(Frame {
                 faces: truly.face_count(),
                 vertices: truly.vertex_count(),
-                visible_vertices: truly.visible_vertices(camera),
+                visible_vertices: measuring.visible(number, || truly.visible_vertices(camera)),
                 dirty_index_bytes,
                 dirty_wedges,
                 strips: self
